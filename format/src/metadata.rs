@@ -286,8 +286,12 @@ impl Metadata {
 
     /// Number of blocks in the whole archive, or `u64::MAX` on overflow.
     pub fn blocks(&self) -> u64 {
-        let per_window = u64::from(self.blocks_per_channel()) * u64::from(self.channels);
-        per_window.saturating_mul(self.windows.len() as u64)
+        self.blocks_per_window().saturating_mul(self.windows.len() as u64)
+    }
+
+    /// Number of blocks in a window, of all channels.
+    pub fn blocks_per_window(&self) -> u64 {
+        u64::from(self.blocks_per_channel()) * u64::from(self.channels)
     }
 
     /// Number of leaves that describe one window.

@@ -13,7 +13,7 @@ use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_PARTS, M
 use crate::metadata::Metadata;
 use crate::reader::{check_payload, read_footer, read_header};
 use crate::section::{FRAME, SectionId, decompress, read, section_at};
-use crate::window::{Basis, WINDOW_END, Window, WindowEnd, WindowRecord};
+use crate::window::{WINDOW_END, Window, WindowEnd, WindowRecord};
 use crate::writer::{Summary, Writer};
 use crate::{Error, Result, Storage};
 use memchr::memmem::Finder;
@@ -395,35 +395,10 @@ fn fill_gap(all: &mut Metadata, record: &WindowRecord, undescribed: &mut Vec<u32
     for number in all.windows.len() as u32..record.number {
         let left = record.window.first_frame.saturating_sub(all.frames);
         let frames = u32::try_from(left / u64::from(record.number - number)).unwrap_or(u32::MAX);
-        let window = lost_window(all.frames, frames);
+        let window = Window::lost(all.frames, frames);
         let times = time.map_or(Vec::new(), |time| vec![time; frames.min(MAX_WINDOW_FRAMES) as usize]);
         all.push(WindowRecord { number, window, times }, &WindowEnd::empty(number))?;
         undescribed.push(number);
     }
     Ok(())
-}
-
-/// A window whose coding is unknown.
-fn lost_window(first_frame: u64, frames: u32) -> Window {
-    Window {
-        first_frame,
-        frames,
-        basis: Basis::Samples,
-        coefficients: frames,
-        levels: vec![frames],
-        functions: Vec::new(),
-        pyramid: None,
-        coarseness: 0.0,
-        range: (f64::INFINITY, f64::NEG_INFINITY),
-        digest: 0,
-        delta: 0.0,
-        reached: 0.0,
-        share: 0.0,
-        squared_error: 0.0,
-        min: f64::INFINITY,
-        max: f64::NEG_INFINITY,
-        missing: 0,
-        coded: 0,
-        outliers: 0,
-    }
 }

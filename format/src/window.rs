@@ -170,6 +170,31 @@ impl WindowEnd {
 }
 
 impl Window {
+    /// A window of which nothing says how it was coded: all its blocks are lost. It has no range, no bound and no totals.
+    pub fn lost(first_frame: u64, frames: u32) -> Self {
+        Self {
+            first_frame,
+            frames,
+            basis: Basis::Samples,
+            coefficients: frames,
+            levels: vec![frames],
+            functions: Vec::new(),
+            pyramid: None,
+            coarseness: 0.0,
+            range: (f64::INFINITY, f64::NEG_INFINITY),
+            digest: 0,
+            delta: 0.0,
+            reached: 0.0,
+            share: 0.0,
+            squared_error: 0.0,
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+            missing: 0,
+            coded: 0,
+            outliers: 0,
+        }
+    }
+
     /// The window with the totals of no blocks.
     pub(crate) fn without_totals(&self) -> Self {
         self.with_totals(&WindowEnd::empty(0))

@@ -2,13 +2,14 @@
 //! stored, with new checksums; nothing is coded anew. The merged file has the bytes of one conversion.
 
 use super::CoefficientFile;
-use crate::base::description::{Description, joined};
+use crate::base::description::{Description, extended, joined};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use serde::Serialize;
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use wavesplat_format::limits::MAX_WINDOW_FRAMES;
 use wavesplat_format::{
     BlockEntry, BlockId, CompletePrefix, EncodedBlock, Features, LeafEntry, Metadata, Window, WindowEnd, WindowRecord,
     Writer,
@@ -29,8 +30,12 @@ pub struct MergeReport {
     pub windows_before: usize,
     /// Blocks that were copied.
     pub blocks: u64,
-    /// Blocks that are lost, since they are damaged.
+    /// Blocks that are lost, since they or their shards are damaged or missing.
     pub blocks_lost: u64,
+    /// Windows of shards that are missing or cannot be opened: all their blocks are lost.
+    pub windows_lost: usize,
+    /// Shards that cannot be opened.
+    pub unreadable: Vec<PathBuf>,
     /// Bytes of the shards.
     pub input_bytes: u64,
     /// Bytes of the merged file.
@@ -56,6 +61,8 @@ impl Place {
             let frames = start.parse().ok()?..end.parse().ok()?;
             Some(Self { number: number.parse().ok()?, of: of.parse().ok()?, frames, all: all.parse().ok()? })
         });
+        let possible = |place: &Self| (1..=place.of).contains(&place.number) && place.frames.end <= place.all;
+        let place = place.filter(possible);
         let place = place.ok_or_else(|| Error::path(file.path(), "is no shard of an archive"))?;
         let frames = file.frames() as u64;
         match place.frames.end.checked_sub(place.frames.start) == Some(frames) {
@@ -79,40 +86,105 @@ pub struct Shards {
     /// The metadata of the merged file before its first frame.
     start: Metadata,
     features: Features,
+    /// The digest of the first window; 0 if it is lost.
     first_digest: u64,
     description: Option<Description>,
+    /// How windows are told that are lost, if there are any.
+    lost: Option<LostWindows>,
+    /// Shards that cannot be opened.
+    unreadable: Vec<PathBuf>,
+}
+
+/// What is known of windows whose shards are missing: their frames, and the range that all windows of shards share.
+#[derive(Debug, Clone, Copy)]
+struct LostWindows {
+    length: u32,
+    range: (f64, f64),
 }
 
 impl Shards {
-    /// Opens the shards of an archive, in any order, one at a time.
+    /// Opens the shards of an archive, in any order, one at a time. With `skip_damaged`, shards may be missing or too damaged
+    /// to be opened; without it they are an error.
     ///
     /// # Errors
     /// Files that are no shards, of another archive, made otherwise, missing, given twice or damaged; each is named.
-    pub fn open(paths: &[PathBuf], progress: &dyn Progress) -> Result<Self> {
+    pub fn open(paths: &[PathBuf], skip_damaged: bool, progress: &dyn Progress) -> Result<Self> {
         progress.start(Some(paths.len() as u64));
-        let mut opened = Vec::new();
+        let (mut opened, mut unreadable) = (Vec::new(), Vec::new());
         for path in paths {
             progress.check()?;
-            opened.push(Opened::of(path, opened.first())?);
+            match Opened::of(path, opened.first()) {
+                Ok(shard) => opened.push(shard),
+                Err(Error::CoefficientFile { source, .. }) if skip_damaged && !source.is_io() => {
+                    unreadable.push(path.clone());
+                }
+                Err(failed) => return Err(failed),
+            }
             progress.advance(1);
         }
         progress.finish();
         opened.sort_by_key(|shard: &Opened| shard.part.place.number);
-        check_order(&opened)?;
-        Self::of(opened).ok_or_else(|| Error::setting("inputs", "no shard was given"))
+        check_order(&opened, skip_damaged)?;
+        let none = || Error::setting("inputs", "no shard can be read");
+        let lost = opened.first().ok_or_else(none)?.lost_windows(&opened)?;
+        let shards = Self::of(opened, lost).ok_or_else(none)?;
+        Ok(Self { unreadable, ..shards })
+    }
+
+    /// Opens shards that follow a whole file: those after it, without a gap. [`Self::merge`] goes on with its windows.
+    ///
+    /// # Errors
+    /// As [`Self::open`], or the file is a shard itself.
+    pub fn after(file: &CoefficientFile, paths: &[PathBuf], progress: &dyn Progress) -> Result<Self> {
+        if super::setting(file.metadata(), SHARD).is_some() {
+            return Err(Error::path(file.path(), "is a shard itself, and shards are merged"));
+        }
+        progress.start(Some(paths.len() as u64));
+        let mut opened = Vec::new();
+        let own = Place { number: 0, of: 0, frames: 0..file.frames() as u64, all: 0 };
+        let whole = Opened::at(own, file, None)?;
+        for path in paths {
+            progress.check()?;
+            let shard = CoefficientFile::open(path)?;
+            opened.push(Opened::at(Place::of(&shard)?, &shard, Some(&whole))?);
+            progress.advance(1);
+        }
+        progress.finish();
+        opened.sort_by_key(|shard: &Opened| shard.part.place.number);
+        check_order(&opened, true)?;
+        opened.insert(0, whole);
+        let shards = Self::of(opened, None).ok_or_else(|| Error::setting("inputs", "no shard can be read"))?;
+        let gaps = shards.gaps().zip(&shards.parts).find(|(gap, _)| gap.start != gap.end);
+        match gaps {
+            Some((Range { start, end }, part)) => {
+                Err(Error::path(&part.path, format!("begins at frame {end}, but frame {start} is next")))
+            }
+            None => Ok(shards),
+        }
     }
 
     /// Shards in order.
-    fn of(opened: Vec<Opened>) -> Option<Self> {
-        let Opened { start, features, first_digest, .. } = opened.first()?;
-        let (start, features, first_digest) = (start.clone(), *features, *first_digest);
+    fn of(opened: Vec<Opened>, lost: Option<LostWindows>) -> Option<Self> {
+        let Opened { part, start, features, first_digest, .. } = opened.first()?;
+        let (start, features, all) = (start.clone(), *features, part.place.all);
+        let first_digest = if part.place.frames.start == 0 { *first_digest } else { 0 };
         let (parts, descriptions): (Vec<_>, Vec<_>) =
             opened.into_iter().map(|shard| (shard.part, shard.description)).unzip();
         let mut descriptions = descriptions.into_iter().flatten();
         let first = descriptions.next();
         let rest: Vec<_> = descriptions.collect();
-        let description = first.map(|first| joined(first, &rest).0);
-        Some(Self { parts, start, features, first_digest, description })
+        let description = first.map(|first| match lost {
+            None => joined(first, &rest).0,
+            Some(_) => extended(first, all).0, // values of lost frames are in no shard
+        });
+        Some(Self { parts, start, features, first_digest, description, lost, unreadable: Vec::new() })
+    }
+
+    /// The frames that no shard has before each shard, and after the last.
+    fn gaps(&self) -> impl Iterator<Item = Range<u64>> {
+        let ends = std::iter::once(0).chain(self.parts.iter().map(|part| part.place.frames.end));
+        let all = self.parts.last().map_or(0, |part| part.place.all);
+        ends.zip(self.parts.iter().map(|part| part.place.frames.start).chain([all])).map(|(end, start)| end..start)
     }
 
     /// Writes the merged file to `out`, after the windows that it has `begun` with. With `skip_damaged`, damaged blocks are
@@ -138,11 +210,14 @@ impl Shards {
         let report = MergeReport { shards: self.parts.len(), windows_before: done.len(), ..MergeReport::default() };
         progress.start(Some(self.parts.iter().map(|part| part.windows as u64).sum()));
         progress.resume(done.len() as u64);
-        let mut merger = Merger { writer, name, done, skip_damaged, report };
-        let mut first_window = 0;
-        for part in &self.parts {
-            merger.add(part, first_window, progress)?;
-            first_window += part.windows;
+        let mut merger = Merger { writer, name, done, skip_damaged, report, next: 0 };
+        for (gap, part) in self.gaps().zip(self.parts.iter().map(Some).chain([None])) {
+            if let Some(lost) = self.lost {
+                merger.add_lost(gap, lost, progress)?;
+            }
+            if let Some(part) = part {
+                merger.add(part, progress)?;
+            }
         }
         let Merger { writer, report, .. } = merger;
         let frames = writer.metadata().frames;
@@ -150,7 +225,8 @@ impl Shards {
         out.flush().map_err(|e| Error::io(name, "writing", e))?;
         progress.finish();
         let input_bytes = self.parts.iter().map(|part| part.bytes).sum();
-        Ok(MergeReport { frames, input_bytes, output_bytes: summary.bytes, ..report })
+        let unreadable = self.unreadable.clone();
+        Ok(MergeReport { frames, input_bytes, output_bytes: summary.bytes, unreadable, ..report })
     }
 }
 
@@ -161,13 +237,44 @@ struct Opened {
     features: Features,
     first_digest: u64,
     description: Option<Description>,
+    range: (f64, f64),
+    has_times: bool,
 }
 
+/// The largest share of windows that may be lost: a forged shard may claim any number of frames.
+const MOST_LOST: u64 = 64;
+
 impl Opened {
+    /// How windows are told whose shards are missing; none if there are none.
+    fn lost_windows(&self, all: &[Self]) -> Result<Option<LostWindows>> {
+        let held: u64 = all.iter().map(|shard| shard.part.place.frames.end - shard.part.place.frames.start).sum();
+        let (path, missing) = (&self.part.path, self.part.place.all.saturating_sub(held));
+        let length = super::setting(&self.start, "window").and_then(|window| window.parse().ok());
+        let length = length.filter(|length| (1..=MAX_WINDOW_FRAMES).contains(length));
+        match (missing, length) {
+            (0, _) => Ok(None),
+            (missing, _) if missing > held.saturating_mul(MOST_LOST) => {
+                Err(Error::input(path, format!("shards with {missing} of {} frames are missing", missing + held)))
+            }
+            (missing, _) if self.has_times => {
+                let what =
+                    format!("shards with {missing} frames are missing, and no other shard knows the times of these");
+                Err(Error::path(path, what))
+            }
+            (_, Some(length)) => Ok(Some(LostWindows { length, range: self.range })),
+            (_, None) => Err(Error::input(path, "does not say how long its windows are, and shards are missing")),
+        }
+    }
+
     /// Opens a shard; an error unless it was made like the first one.
     fn of(path: &Path, first: Option<&Self>) -> Result<Self> {
         let file = CoefficientFile::open(path)?;
-        let (place, description, metadata) = (Place::of(&file)?, file.description()?, file.metadata());
+        Self::at(Place::of(&file)?, &file, first)
+    }
+
+    /// A file with a known place; an error unless it was made like the first one.
+    fn at(place: Place, file: &CoefficientFile, first: Option<&Self>) -> Result<Self> {
+        let (path, description, metadata) = (file.path(), file.description()?, file.metadata());
         let features = file.reader.features();
         let start = without_shard(metadata);
         if let Some(first) = first
@@ -182,7 +289,9 @@ impl Opened {
         }
         let first_digest = metadata.windows.first().map_or(0, |window| window.digest);
         let part = Part { path: path.into(), windows: metadata.windows.len(), bytes: file.bytes(), place };
-        Ok(Self { part, start, features, first_digest, description })
+        let range = metadata.windows.first().map_or((f64::INFINITY, f64::NEG_INFINITY), |window| window.range);
+        let has_times = !metadata.times.is_empty();
+        Ok(Self { part, start, features, first_digest, description, range, has_times })
     }
 }
 
@@ -247,36 +356,41 @@ fn difference(first: &Metadata, other: &Metadata) -> Option<String> {
     named.or(differ).or((first != other).then(|| "settings".into()))
 }
 
-/// An error unless shards are all there, once each, with frames one after another.
-fn check_order(shards: &[Opened]) -> Result<()> {
-    let mut end = 0;
+/// An error unless shards are all there, once each, with frames one after another. With `may_lack` some may be missing.
+fn check_order(shards: &[Opened], may_lack: bool) -> Result<()> {
+    let (mut before, mut end) = (0, 0);
     for (n, Opened { part: Part { path, place, .. }, .. }) in shards.iter().enumerate() {
         let first = &shards[0].part;
         if (place.of, place.all) != (first.place.of, first.place.all) {
             let what = format!("is one of {} shards, but {} of {}", place.of, first.path.display(), first.place.of);
             return Err(Error::path(path, what));
         }
-        if let Some(before) = n.checked_sub(1).map(|n| &shards[n].part).filter(|b| b.place.number == place.number) {
-            return Err(Error::path(path, format!("is shard {}, as {} is", place.number, before.path.display())));
+        if let Some(twin) = n.checked_sub(1).map(|n| &shards[n].part).filter(|_| before == place.number) {
+            return Err(Error::path(path, format!("is shard {}, as {} is", place.number, twin.path.display())));
         }
-        if place.number != n + 1 {
-            return Err(Error::path(path, format!("shard {} of {} is missing before it", n + 1, place.of)));
+        let follows = place.number == before + 1;
+        if !follows && !may_lack {
+            return Err(Error::path(path, format!("shard {} of {} is missing before it", before + 1, place.of)));
         }
-        if place.frames.start != end {
+        if place.frames.start < end || follows && place.frames.start != end {
             return Err(Error::input(path, format!("begins at frame {}, not {end}", place.frames.start)));
         }
-        end = place.frames.end;
+        (before, end) = (place.number, place.frames.end);
     }
     match shards.last().map(|shard| &shard.part) {
-        Some(last) if shards.len() < last.place.of => {
-            let (next, of) = (shards.len() + 1, last.place.of);
-            Err(Error::path(&last.path, format!("shard {next} of {of} is missing after it")))
+        Some(last) if before < last.place.of && !may_lack => {
+            Err(Error::path(&last.path, format!("shard {} of {} is missing after it", before + 1, last.place.of)))
         }
-        Some(last) if end != last.place.all => {
+        Some(last) if before == last.place.of && end != last.place.all => {
             Err(Error::input(&last.path, format!("ends at frame {end} of {}", last.place.all)))
         }
         _ => Ok(()),
     }
+}
+
+/// The frames of a shard, and how many its archive has; none of other files.
+pub fn frames_of_shard(file: &CoefficientFile) -> Option<(Range<u64>, u64)> {
+    Place::of(file).ok().map(|place| (place.frames, place.all))
 }
 
 /// A merged file that is being written.
@@ -287,12 +401,16 @@ struct Merger<'a, W: Write> {
     done: Vec<Window>,
     skip_damaged: bool,
     report: MergeReport,
+    /// The number of the next window.
+    next: usize,
 }
 
 impl<W: Write> Merger<'_, W> {
-    /// Adds the windows of a shard, the first of which has this number.
-    fn add(&mut self, part: &Part, first_window: usize, progress: &dyn Progress) -> Result<()> {
-        if first_window + part.windows <= self.done.len() {
+    /// Adds the windows of a shard.
+    fn add(&mut self, part: &Part, progress: &dyn Progress) -> Result<()> {
+        let first_window = self.next;
+        self.next += part.windows;
+        if self.next <= self.done.len() {
             return Ok(()); // the file's id and the order of shards say that they are these
         }
         let file = CoefficientFile::open(&part.path)?;
@@ -308,6 +426,36 @@ impl<W: Write> Merger<'_, W> {
             progress.advance(1);
         }
         file.check_unchanged()
+    }
+
+    /// Adds lost windows for frames that are in no shard.
+    fn add_lost(&mut self, frames: Range<u64>, lost: LostWindows, progress: &dyn Progress) -> Result<()> {
+        for first in frames.clone().step_by(lost.length as usize) {
+            progress.check()?;
+            let length = u64::from(lost.length).min(frames.end - first) as u32;
+            let window = Window { range: lost.range, ..Window::lost(first, length) };
+            self.report.windows_lost += 1;
+            self.report.blocks_lost += self.writer.metadata().blocks_per_window();
+            if !self.has(self.next, &window, Path::new("a missing shard"))? {
+                self.add_lost_window(window)?;
+            }
+            self.next += 1;
+        }
+        Ok(())
+    }
+
+    fn add_lost_window(&mut self, window: Window) -> Result<()> {
+        let number = self.next as u32;
+        self.written(|writer| writer.begin_window(WindowRecord { number, window, times: Vec::new() }))?;
+        let (channels, blocks) = (self.writer.metadata().channels, self.writer.metadata().blocks_per_channel());
+        for id in
+            (0..channels).flat_map(|channel| (0..blocks).map(move |block| BlockId { window: number, block, channel }))
+        {
+            self.report.blocks += 1;
+            self.written(|writer| writer.append_lost(id))?;
+        }
+        self.written(|writer| writer.end_window(&WindowEnd::empty(number)))?;
+        self.writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))
     }
 
     /// Whether an earlier run wrote a window; an error if it wrote another.

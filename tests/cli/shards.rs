@@ -152,3 +152,109 @@ fn shards_of_archives_with_coordinates_and_dates() {
     work.wavesplat("merge part-2.wspl part-1.wspl -o merged.wspl").ok();
     assert!(work.read("merged.wspl") == work.read("whole.wspl"));
 }
+
+#[test]
+fn missing_shards_become_lost_windows_of_the_right_frames() {
+    let work = work();
+    shards(&work, "--range -2,3", 5);
+    convert(&work, "--range -2,3", None, "whole.wspl");
+    work.write("torn.wspl", &work.read("part-3.wspl")[..300]);
+    for (inputs, lost, windows) in [
+        ("part-1.wspl part-2.wspl part-3.wspl part-4.wspl", "64:80", 2),
+        ("part-2.wspl part-3.wspl part-4.wspl part-5.wspl", "0:16", 2),
+        ("part-1.wspl part-4.wspl part-5.wspl", "16:48", 4),
+        ("part-1.wspl part-2.wspl torn.wspl part-4.wspl part-5.wspl", "32:48", 2),
+    ] {
+        let merge = format!("merge {inputs} -o merged.wspl --force");
+        work.wavesplat(&merge).fails_or_finds(if inputs.contains("torn") { 3 } else { 2 }, &[]);
+        let words = format!("all of {windows} windows of missing shards");
+        let run = work.wavesplat(&format!("{merge} --skip-damaged")).fails(3, &[&words]);
+        assert_eq!(run.message().contains("torn.wspl: cannot be opened"), inputs.contains("torn"));
+        let info = work.wavesplat("info merged.wspl --json").ok().json();
+        assert_eq!(info["frames"], 80);
+        work.wavesplat("verify merged.wspl").finds(3, &["lost"]);
+        work.wavesplat(&format!("extract merged.wspl --frames {lost} -o lost.npy --force")).fails(3, &["lost"]);
+        let (start, end) = lost.split_once(':').unwrap();
+        for kept in
+            [format!("0:{start}"), format!("{end}:80")].iter().filter(|kept| !["0:0", "80:80"].contains(&kept.as_str()))
+        {
+            for file in ["merged", "whole"] {
+                work.wavesplat(&format!("extract {file}.wspl --frames {kept} -o {file}.npy --force")).ok();
+            }
+            assert!(work.read("merged.npy") == work.read("whole.npy"), "{inputs}: {kept}");
+        }
+    }
+    work.wavesplat("merge torn.wspl -o merged.wspl --skip-damaged --force").fails(2, &["no shard can be read"]);
+    work.shell("rm part-*.wspl").ok();
+    shards(&work, "--range -2,3 --times 5,0.5 --time-unit s", 2);
+    work.wavesplat("merge part-2.wspl -o merged.wspl --skip-damaged --force")
+        .fails(2, &["no other shard knows the times"]);
+}
+
+#[test]
+fn a_merge_without_shards_goes_on() {
+    let work = work();
+    shards(&work, "--range -2,3", 5);
+    let merge = "$WAVESPLAT merge part-[1245].wspl -o merged.wspl --skip-damaged";
+    work.shell(merge).fails(3, &["lost"]);
+    let whole = work.read("merged.wspl");
+    work.shell("rm merged.wspl").ok();
+    for share in [2, 3] {
+        work.write("merged.wspl.part", &whole[..whole.len() * share / 4]);
+        work.shell(&format!("{merge} --resume")).fails_or_finds(3, &["windows of missing shards"]);
+        assert!(work.read("merged.wspl") == whole, "{share} quarters");
+        work.shell("rm merged.wspl").ok();
+    }
+}
+
+#[test]
+fn shards_are_appended_to_the_bytes_of_one_conversion() {
+    let work = work();
+    shards(&work, "--range -2,3", 5);
+    convert(&work, "--range -2,3", None, "whole.wspl");
+    work.write("first.npy", Archive::smooth([20, 14, 10], 16).npy());
+    work.wavesplat("convert first.npy -o run.wspl --window 8 --chain 2 --range -2,3").ok();
+    work.wavesplat("append run.wspl part-3.wspl")
+        .fails(2, &["part-3.wspl", "begins at frame 32, but frame 16 is next"]);
+    work.wavesplat("append run.wspl part-1.wspl").fails(2, &["part-1.wspl", "begins at frame 0"]);
+    work.wavesplat("append run.wspl part-2.wspl").ok();
+    work.wavesplat("append run.wspl part-2.wspl --resume").ok();
+    work.wavesplat("append run.wspl part-2.wspl").fails(2, &["but frame 32 is next"]);
+    work.wavesplat("append run.wspl part-4.wspl part-3.wspl --json").ok();
+    work.write("run.wspl.part", &work.read("whole.wspl")[..work.read("whole.wspl").len() * 9 / 10]);
+    work.wavesplat("append run.wspl part-5.wspl").fails(2, &["run.wspl.part"]);
+    work.wavesplat("append run.wspl part-5.wspl --resume").ok();
+    assert!(work.read("run.wspl") == work.read("whole.wspl"));
+    work.wavesplat("append part-1.wspl part-2.wspl").fails(2, &["part-1.wspl", "is a shard itself"]);
+    convert(&work, "--range -2,4", Some("2/5"), "wider.wspl");
+    work.wavesplat("convert first.npy -o run.wspl --window 8 --chain 2 --range -2,3 --force").ok();
+    work.wavesplat("append run.wspl wider.wspl").fails(2, &["wider.wspl", "range"]);
+    work.wavesplat("append run.wspl part-2.wspl --frames 3:").fails(2, &["--frames"]);
+}
+
+#[test]
+fn a_shard_is_compared_with_its_frames_of_the_whole_archive() {
+    let work = work();
+    shards(&work, "--range -2,3 --tolerance 0", 3);
+    for n in 1..=3 {
+        work.wavesplat(&format!("verify part-{n}.wspl --against all.npy")).ok();
+    }
+    work.wavesplat("verify part-2.wspl --against all.npy --frames 0:32").fails_or_finds(4, &[]);
+    work.wavesplat("convert all.npy --frames 10:70 -o some.wspl --window 8 --chain 2 --range -2,3 --shard 2/2").ok();
+    work.wavesplat("verify some.wspl --against all.npy").ok();
+}
+
+/// Frames that are all alike are coded along time alone, without nested codes; the header of each shard announces them.
+#[test]
+fn the_first_shard_may_have_no_nested_codes() {
+    let work = Work::new();
+    let flat_at_first = |x: usize, y: usize, z: usize, t: usize| match t {
+        0..32 => 1.0,
+        _ => ((0.31 * x as f32).sin() * (0.23 * y as f32).cos() + 0.1 * z as f32) * (1.0 + 0.01 * t as f32),
+    };
+    work.write("all.npy", Archive::of([40, 32, 24], 64, flat_at_first).npy());
+    convert(&work, "--range -2,5", None, "whole.wspl");
+    shards(&work, "--range -2,5", 4);
+    work.shell("$WAVESPLAT merge part-*.wspl -o merged.wspl").ok();
+    assert!(work.read("merged.wspl") == work.read("whole.wspl"));
+}

@@ -8,7 +8,8 @@ use wavesplat::base::output::{STANDARD, part_of};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use wavesplat::convert::{ConvertConfig, PartialFile, of_file};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::resume::{Earlier, begins_with, ends_with, open_successor};
+use wavesplat::file::merge::{Shards, frames_of_shard};
+use wavesplat::file::resume::{self, Earlier, begins_with, ends_with, open_successor};
 use wavesplat::source::FrameSource;
 
 /// Add later frames to a coefficient file
@@ -17,17 +18,19 @@ use wavesplat::source::FrameSource;
     before_help = "\
 Examples:
   wavesplat append run.wspl more/
-  wavesplat append run.wspl frames/ --frames 400:",
+  wavesplat append run.wspl frames/ --frames 400:
+  wavesplat append run.wspl part-3.wspl",
     after_help = "\
 The new frames are coded with the file's settings and region, in windows after the existing ones. Full windows are the same as \
 if all frames had been converted at once. The command works on a copy that replaces the file when it is complete: programs that \
 read the old file are not disturbed, and a killed run loses nothing. If --frames begins at the end of the frames that exist so \
-far, the command does nothing and succeeds."
+far, the command does nothing and succeeds. Shards of the same archive that follow the file's frames are copied, not coded \
+again."
 )]
 pub(crate) struct AppendArgs {
     /// Coefficient file
     file: PathBuf,
-    /// The next frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input
+    /// The next frames: files in order, a folder, a pattern in quotes, one 4-D file, shards, or - for standard input
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// Add only these frames of INPUTS: a:b or a:b:step, without b
@@ -52,6 +55,9 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let linked = linked.map_err(|e| Error::io(&args.file, "opening", e))?;
     let path = linked.unwrap_or(args.file.clone()); // replaces the file, not the link to it
     let file = CoefficientFile::open_with(&path, args.input.access())?;
+    if args.inputs.iter().all(|input| is_shard(input)) {
+        return args.append_shards(&file);
+    }
     let config = args.config(&file)?;
     let source = args.input.open_again(&file, &args.inputs, None, &args.common)?;
     if let (Some(asked), Some(all)) = (args.frames, source.archive().frames)
@@ -80,7 +86,42 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
 }
 
+/// Whether an input is a shard, which is copied; other coefficient files are sources like any other.
+fn is_shard(input: &Path) -> bool {
+    let is_named = input.extension().is_some_and(|extension| extension == "wspl");
+    is_named && CoefficientFile::open(input).is_ok_and(|file| frames_of_shard(&file).is_some())
+}
+
 impl AppendArgs {
+    /// Copies the windows of shards.
+    fn append_shards(&self, file: &CoefficientFile) -> Result<()> {
+        if self.frames.is_some() {
+            return Err(Error::usage("--frames: shards are appended whole"));
+        }
+        spare_inputs(&self.inputs, file.path())?;
+        if self.resume && self.has_shards(file)? {
+            self.common.note(format_args!("{}: ends with these frames already", self.file.display()));
+            return Ok(());
+        }
+        let shards = Shards::after(file, &self.inputs, &self.common.progress("open", "shards"))?;
+        let earlier = Earlier::by(self.force, self.resume);
+        let (mut out, begun) = open_successor(file, earlier)?;
+        let progress = self.common.progress("merge", "windows");
+        let report = shards.merge(Some(begun), false, (file.path(), &mut out), &progress)?;
+        file.check_unchanged()?;
+        out.commit_if(resume::check)?;
+        let (frames, bytes) = (report.frames, report.output_bytes);
+        self.common.note(format_args!("{frames} frames, {} of them from before, {bytes} bytes", file.frames()));
+        self.common.report(&report, false)
+    }
+
+    /// Whether the file ends where the last of the shards ends.
+    fn has_shards(&self, file: &CoefficientFile) -> Result<bool> {
+        let end = |input| Ok(frames_of_shard(&CoefficientFile::open(input)?).map_or(0, |(frames, _)| frames.end));
+        let ends = self.inputs.iter().map(end).collect::<Result<Vec<u64>>>()?;
+        Ok(ends.iter().max() == Some(&(file.frames() as u64)))
+    }
+
     /// Whether the file ends with these frames, if `--resume` allows that; without it, an error.
     fn has_them(&self, file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
         if self.is_streamed() {

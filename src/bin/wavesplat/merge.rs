@@ -18,7 +18,7 @@ Examples:
     after_help = "\
 The shards are those of wavesplat convert --shard, in any order. Blocks are copied as they are stored, so nothing is coded anew: \
 the file has the bytes of one conversion with the same options. Shards that are missing, given twice, of another archive, made \
-otherwise or damaged are named."
+otherwise or damaged are named. With --skip-damaged, frames of missing shards are lost, as damaged blocks are."
 )]
 pub(crate) struct MergeArgs {
     /// Shards, in any order
@@ -33,7 +33,7 @@ pub(crate) struct MergeArgs {
     /// Continue an unfinished earlier run of this command, to the same bytes
     #[arg(long)]
     resume: bool,
-    /// Keep the blocks that are whole; damaged ones are lost. Exit code 3 if there are any
+    /// Keep the blocks that are whole; damaged ones, and those of missing shards, are lost. Exit code 3 if there are any
     #[arg(long)]
     skip_damaged: bool,
     #[command(flatten)]
@@ -43,16 +43,24 @@ pub(crate) struct MergeArgs {
 pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     args.common.start()?;
     spare_inputs(&args.shards, &args.output)?;
-    let shards = Shards::open(&args.shards, &args.common.progress("open", "shards"))?;
+    let shards = Shards::open(&args.shards, args.skip_damaged, &args.common.progress("open", "shards"))?;
     let (mut out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
     let progress = args.common.progress("merge", "windows");
     let report = shards.merge(begun, args.skip_damaged, (&args.output, &mut out), &progress)?;
     out.commit_if(resume::check)?;
-    let MergeReport { shards, frames, output_bytes, blocks_lost, .. } = report;
+    for shard in &report.unreadable {
+        let what = "cannot be opened; wavesplat recover saves what is whole";
+        args.common.note(format_args!("{}: {what}", shard.display()));
+    }
+    let MergeReport { shards, frames, output_bytes, blocks_lost, windows_lost, .. } = report;
     args.common.note(format_args!("{shards} shards, {frames} frames, {output_bytes} bytes"));
     args.common.report(&report, args.output == Path::new(STANDARD))?;
     match blocks_lost {
         0 => Ok(()),
+        lost if windows_lost > 0 => {
+            let what = format!("blocks are lost: {lost}, with all of {windows_lost} windows of missing shards");
+            Err(Error::input(&args.output, what))
+        }
         lost => Err(Error::input(&args.output, format!("blocks of damaged shards are lost: {lost}"))),
     }
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
 use wavesplat::file::CoefficientFile;
+use wavesplat::file::merge::frames_of_shard;
 use wavesplat::file::report::{BoundReport, largest_bound};
 use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat::source::FrameSource;
@@ -101,8 +102,15 @@ impl VerifyArgs {
         let source = self.input.open_again(file, &self.against, self.frames, &self.common)?;
         // Appended frames may come from the same archive: then all its frames count, not those converted first.
         let is_all = self.frames.is_some() || source.archive().frames == Some(file.frames());
-        let first = if is_all { None } else { remembered(file, "frames")? };
-        narrow(source, first, None).map(Some)
+        if is_all {
+            return Ok(Some(source));
+        }
+        let source = narrow(source, remembered(file, "frames")?, None)?;
+        let shard =
+            frames_of_shard(file).filter(|(_, all)| source.archive().frames.map(|frames| frames as u64) == Some(*all));
+        let of_shard = shard.map(|(frames, _)| format!("{}:{}", frames.start, frames.end));
+        let of_shard = of_shard.map(|range| range.parse().map_err(|what: String| Error::input(file.path(), what)));
+        narrow(source, of_shard.transpose()?, None).map(Some)
     }
 }
 

@@ -230,7 +230,7 @@ pub(crate) fn merge(
     report_to: Option<Py<PyAny>>,
 ) -> PyResult<String> {
     job::run(py, report_to.as_ref(), |progress, _| {
-        let shards = Shards::open(&shards, progress)?;
+        let shards = Shards::open(&shards, false, progress)?;
         let (mut out, begun) = resume::open(&path, overwrite, Earlier::by(overwrite, resume))?;
         let report = shards.merge(begun, false, (&path, &mut out), progress)?;
         out.commit_if(resume::check)?;
