@@ -11,11 +11,22 @@ pub fn is_address(path: &Path) -> bool {
 }
 
 /// An error if a file that is to be written is on a server.
-pub(crate) fn refuse_output(path: &Path) -> Result<()> {
+///
+/// # Errors
+/// It is.
+pub fn refuse_output(path: &Path) -> Result<()> {
     if is_address(path) {
         let what =
             "files are not written to servers; write to - and pipe that to a program that uploads, like `aws s3 cp -`";
         return Err(Error::path(public_name(path), what));
+    }
+    Ok(())
+}
+
+/// An error if a file that must be local is on a server.
+pub(crate) fn refuse_address(path: &Path) -> Result<()> {
+    if is_address(path) {
+        return Err(Error::path(public_name(path), "must be a file of this machine; download it"));
     }
     Ok(())
 }

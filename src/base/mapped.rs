@@ -6,6 +6,7 @@
 //! call [`explain_sigbus`] so that the user reads which file failed instead of "Bus error".
 #![allow(unsafe_code)]
 
+use crate::base::address::refuse_address;
 use crate::base::error::{ChangedSince, Error, Result};
 use memmap2::{Advice, Mmap, MmapOptions};
 use std::ffi::{CString, c_char, c_int, c_void};
@@ -91,6 +92,7 @@ pub struct FileBytes {
 impl FileBytes {
     /// Opens a regular file for reading.
     pub fn open(path: &Path, access: Access) -> Result<Self> {
+        refuse_address(path)?;
         let failed = |e| Error::io(path, "opening", e);
         let file = File::open(path).map_err(failed)?;
         let meta = file.metadata().map_err(failed)?;

@@ -74,7 +74,7 @@ impl RemoteArgs {
             return CoefficientFile::open_with(path, access);
         }
         let file = self.open.get(path, || remote::open(path, &self.options()?))?;
-        CoefficientFile::from_storage(public_name(path), file)
+        CoefficientFile::from_remote(path, file)
     }
 
     /// The same, with a file that others keep open.

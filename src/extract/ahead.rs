@@ -32,7 +32,7 @@ impl Ahead {
         file.fetch_leaves_of(soon.take(WINDOWS_TOGETHER), channel, &next[0].region)?;
         let mut gathered = Gathered::default();
         self.fetched = self.decoded - count;
-        for piece in next {
+        for piece in next.iter().take(WINDOWS_TOGETHER) {
             for frames in windows(file, piece) {
                 gathered.add(parts_of(file, channel, (piece, frames))?);
             }

@@ -13,7 +13,7 @@ use crate::codec::decode::Block;
 use crate::file::counted::Counted;
 use crate::file::detail;
 use crate::file::promise;
-use crate::remote::{self, RemoteOptions};
+use crate::remote::{self, RemoteFile, RemoteOptions};
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -96,7 +96,12 @@ impl CoefficientFile {
     /// # Errors
     /// As [`Self::open`], and all that can be wrong on the way.
     pub fn open_remote(address: &Path, options: &RemoteOptions) -> Result<Self> {
-        Self::from_storage(public_name(address), remote::open(address, options)?)
+        Self::from_remote(address, remote::open(address, options)?)
+    }
+
+    /// Opens a remote file that is kept open.
+    pub(crate) fn from_remote(address: &Path, file: RemoteFile) -> Result<Self> {
+        Self::from_kept(public_name(address), Box::new(file))
     }
 
     /// Opens a file in any storage: memory, or bytes far away. `name` stands for it in messages. What is read of a
@@ -105,9 +110,13 @@ impl CoefficientFile {
     /// # Errors
     /// As [`Self::open`].
     pub fn from_storage(name: impl Into<PathBuf>, storage: impl Storage + Send + Sync + 'static) -> Result<Self> {
-        let path = name.into();
+        Self::from_kept(name.into(), remote::kept(Box::new(storage)))
+    }
+
+    /// Opens a file in a storage that keeps what was read, if it is remote.
+    fn from_kept(path: PathBuf, storage: Box<dyn Storage + Send + Sync>) -> Result<Self> {
         let failed = |source| Error::CoefficientFile { path: path.clone(), source };
-        let storage = Counted::new(remote::kept(Box::new(storage)));
+        let storage = Counted::new(storage);
         let ends = [0..1, storage.len().saturating_sub(tail(storage.len()))..storage.len()];
         storage.fetch(&ends).map_err(|e| failed(e.into()))?;
         let reader = Reader::open(storage).map_err(failed)?;
@@ -277,7 +286,10 @@ impl CoefficientFile {
     pub fn skip_damaged(mut self) -> Result<Self> {
         let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
         let leaves: Vec<_> = leaves.copied().collect();
-        let found = leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?;
+        let found = match self.is_remote() {
+            true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // so that pages stay
+            false => leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?,
+        };
         self.skipped = Some(Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() });
         Ok(self)
     }
@@ -406,19 +418,16 @@ impl CoefficientFile {
         self.reader.check_structure(&mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 
-    /// Checks every byte of a leaf and its blocks, of these entries, that is in no part; `found` is told what is wrong.
-    pub(crate) fn check_leaf(
-        &self,
-        leaf: &LeafEntry,
-        blocks: &[BlockEntry],
-        found: &mut dyn FnMut(Error),
-    ) -> Result<()> {
+    /// Checks every byte of consecutive blocks, the first of which begins at `at`, that is in no part; `found` is told what
+    /// is wrong. Returns where the next block begins.
+    pub(crate) fn check_blocks(&self, at: u64, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<u64> {
         let mut found = |wrong| found(self.failed(wrong));
-        let mut at = leaf.data_offset;
-        for blocks in blocks.chunks(TOGETHER) {
-            self.fetch_whole(blocks)?;
-            at = self.reader.check_blocks(at, blocks, &mut found).map_err(|e| self.failed(e))?;
-        }
+        self.reader.check_blocks(at, blocks, &mut found).map_err(|e| self.failed(e))
+    }
+
+    /// Checks the padding behind a leaf; `found` is told if it is wrong.
+    pub(crate) fn check_leaf_end(&self, leaf: &LeafEntry, found: &mut dyn FnMut(Error)) -> Result<()> {
+        let mut found = |wrong| found(self.failed(wrong));
         self.reader.check_leaf_end(leaf, &mut found).map_err(|e| self.failed(e))
     }
 
@@ -428,13 +437,14 @@ impl CoefficientFile {
         let mut found = |error| wrong = wrong.take().or(Some(error));
         self.check_structure(&mut found)?;
         for leaf in (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window)) {
-            let entries = self.leaf(leaf)?;
-            self.check_leaf(leaf, &entries, &mut found)?;
-            for entries in entries.chunks(TOGETHER) {
+            let mut at = leaf.data_offset;
+            for entries in self.leaf(leaf)?.chunks(TOGETHER) {
                 self.fetch_whole(entries)?;
+                at = self.check_blocks(at, entries, &mut found)?;
                 let present = entries.par_iter().filter(|entry| !entry.lost);
                 present.try_for_each(|entry| self.reader.check_stored(entry)).map_err(|e| self.failed(e))?;
             }
+            self.check_leaf_end(leaf, &mut found)?;
         }
         wrong.map_or(Ok(()), Err)
     }

@@ -5,7 +5,7 @@ use crate::base::error::Result;
 use crate::base::grid::Region;
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
-use crate::remote::FETCHED;
+use crate::remote::{FETCHED, PageCount};
 use rayon::prelude::*;
 use std::ops::Range;
 use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
@@ -17,21 +17,25 @@ pub(crate) const WINDOWS_TOGETHER: usize = 256;
 #[derive(Debug, Default)]
 pub(crate) struct Gathered {
     parts: Vec<PartEntry>,
-    bytes: u64,
+    pages: PageCount,
 }
 
 impl Gathered {
     pub(crate) fn add(&mut self, parts: impl IntoIterator<Item = PartEntry>) {
         for part in parts {
-            self.bytes += u64::from(part.stored_len);
+            self.pages.add(&bytes_of(&part));
             self.parts.push(part);
         }
     }
 
     /// Whether there are as many as a remote file keeps.
     pub(crate) fn is_full(&self) -> bool {
-        self.bytes >= FETCHED
+        self.pages.is_full()
     }
+}
+
+fn bytes_of(part: &PartEntry) -> Range<u64> {
+    part.offset..part.offset.saturating_add(part.stored_len.into())
 }
 
 impl CoefficientFile {
@@ -81,7 +85,7 @@ impl CoefficientFile {
 
     /// Fetches parts that will be read soon.
     fn fetch_parts<'a>(&self, parts: impl Iterator<Item = &'a PartEntry>) -> Result<()> {
-        self.fetch(parts.map(|part| part.offset..part.offset.saturating_add(part.stored_len.into())))
+        self.fetch(parts.map(bytes_of))
     }
 
     /// Fetches what of some blocks is needed for the coefficients that `wanted` marks.

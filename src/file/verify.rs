@@ -167,13 +167,15 @@ pub fn verify(
             let entries = report.whole(file.leaf(leaf))?;
             report.unchecked += if entries.is_none() { u64::from(leaf.count) } else { 0 };
             let entries = entries.unwrap_or_default();
-            file.check_leaf(leaf, &entries, &mut |wrong| report.damage(&wrong))?;
+            let mut at = leaf.data_offset;
             for entries in entries.chunks(at_once) {
                 file.fetch_whole(entries)?;
+                at = file.check_blocks(at, entries, &mut |wrong| report.damage(&wrong))?;
                 for found in entries.par_iter().map(check).collect::<Vec<_>>() {
                     all = report.whole(found)?.map_or(all, |found| all.join(found));
                 }
             }
+            file.check_leaf_end(leaf, &mut |wrong| report.damage(&wrong))?;
             report.blocks += entries.len() as u64;
             progress.advance(leaf.count.into());
         }

@@ -20,9 +20,6 @@ const PREFIX: &str = "wavesplat-";
 /// The ending of pages.
 const ENDING: &str = "page";
 
-/// Bytes that may be written before sizes are counted again.
-const BETWEEN_COUNTS: u64 = 64 << 20;
-
 /// Use within this time is not noted.
 const RECENT: Duration = Duration::from_secs(60);
 
@@ -52,11 +49,13 @@ impl Cache {
         Ok(cache)
     }
 
-    /// The part of an object that its first bytes, its version and its length tell from all others. The first bytes hold the
-    /// identity of a coefficient file.
+    /// The part of an object that its name, its first bytes, its version and its length tell from all others. The first bytes
+    /// hold the identity of a coefficient file.
     #[cfg_attr(not(feature = "remote"), allow(dead_code, reason = "only objects of servers have this"))]
-    pub(super) fn object(&self, first: &[u8], version: &str, len: u64) -> CachedObject {
-        let digest = xxh3_128(&[first, version.as_bytes(), &len.to_le_bytes()].concat());
+    pub(super) fn object(&self, name: &Path, (first, version, len): (&[u8], &str, u64)) -> CachedObject {
+        let digests =
+            [name.as_os_str().as_encoded_bytes(), first, version.as_bytes(), &len.to_le_bytes()].map(xxh3_128);
+        let digest = xxh3_128(&digests.map(u128::to_le_bytes).concat());
         CachedObject {
             cache: self.clone(),
             folder: self.folder.join(format!("{PREFIX}{digest:032x}")),
@@ -66,7 +65,7 @@ impl Cache {
 
     /// Counts bytes that were written, and makes room from time to time.
     fn grown(&self, bytes: u64) {
-        if self.written.fetch_add(bytes, Relaxed) + bytes > BETWEEN_COUNTS.min(self.most / 4) {
+        if self.written.fetch_add(bytes, Relaxed) + bytes > self.most / 16 {
             self.written.store(0, Relaxed);
             self.trim();
         }
@@ -167,22 +166,24 @@ mod tests {
     fn pages_come_back_for_the_same_object_alone() {
         let folder = tempfile::tempdir().expect("a folder");
         let cache = Cache::new(folder.path().join("deep/er"), 1 << 30).expect("a folder");
-        let object = cache.object(b"first", "\"1\"", 100_000);
+        let name = Path::new("https://host/run.wspl");
+        let object = cache.object(name, (b"first", "\"1\"", 100_000));
         object.store(1, &[7; 30_000]);
         assert_eq!(object.load(1, 30_000), Some(vec![7; 30_000]));
-        assert_eq!(cache.object(b"first", "\"1\"", 100_000).load(1, 30_000), Some(vec![7; 30_000]));
+        assert_eq!(cache.object(name, (b"first", "\"1\"", 100_000)).load(1, 30_000), Some(vec![7; 30_000]));
         assert_eq!((object.load(1, 9), object.load(0, 30_000)), (None, None));
+        assert_eq!(cache.object(Path::new("other"), (b"first", "\"1\"", 100_000)).load(1, 30_000), None);
         for (first, version, len) in
             [("other", "\"1\"", 100_000), ("first", "\"2\"", 100_000), ("first", "\"1\"", 100_001)]
         {
-            assert_eq!(cache.object(first.as_bytes(), version, len).load(1, 30_000), None);
+            assert_eq!(cache.object(name, (first.as_bytes(), version, len)).load(1, 30_000), None);
         }
     }
 
     #[test]
     fn damaged_pages_are_not_used() {
         let folder = tempfile::tempdir().expect("a folder");
-        let object = Cache::new(folder.path(), 1 << 30).expect("a folder").object(b"", "", 1000);
+        let object = Cache::new(folder.path(), 1 << 30).expect("a folder").object(Path::new("a"), (b"", "", 1000));
         object.store(0, &[1; 1000]);
         let whole = fs::read(object.path(0)).expect("it was stored");
         for at in [0, 500, 999, 1000, 1007] {
@@ -211,7 +212,8 @@ mod tests {
             for name in ["a", "b", "c"] {
                 let folder = folder.path();
                 scope.spawn(move || {
-                    let object = Cache::new(folder, most).expect("a folder").object(name.as_bytes(), "", 1 << 30);
+                    let object =
+                        Cache::new(folder, most).expect("a folder").object(Path::new(name), (b"", "", 1 << 30));
                     (0..40).for_each(|page| object.store(page, &[3; 10_000]));
                 });
             }

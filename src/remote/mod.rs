@@ -18,8 +18,8 @@ mod answer;
 mod object;
 
 pub use cache::Cache;
-pub(crate) use paged::FETCHED;
 use paged::Paged;
+pub(crate) use paged::{FETCHED, PageCount};
 
 #[cfg(not(feature = "remote"))]
 use crate::base::address::public_name;
@@ -59,7 +59,7 @@ pub fn open(address: &Path, options: &RemoteOptions) -> Result<RemoteFile> {
     Ok(Arc::new(object::open(address, options)?))
 }
 
-/// A storage whose bytes are kept once they were read, if it is remote and does not keep them itself.
+/// A storage whose bytes are kept once they were read, if it is remote.
 pub(crate) fn kept(storage: Box<dyn Storage + Send + Sync>) -> Box<dyn Storage + Send + Sync> {
     if storage.is_remote() { Box::new(Paged::new(storage, None)) } else { storage }
 }

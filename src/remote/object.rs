@@ -11,8 +11,10 @@ use std::ops::Range;
 use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
+use ureq::config::RedirectAuthHeaders;
 use ureq::tls::{RootCerts, TlsConfig};
 use ureq::{Agent, Body};
 use wavesplat_format::Storage;
@@ -44,7 +46,7 @@ pub(super) fn open(address: &Path, options: &RemoteOptions) -> error::Result<Pag
     let of = Address::parse(&address.to_string_lossy()).map_err(|what| Error::path(&name, what))?;
     let (object, first) = Object::open(of, options.timeout).map_err(|e| Error::io(&name, "opening", e))?;
     let version = options.cache.as_ref().zip(object.about.version());
-    let on_disk = version.map(|(cache, version)| cache.object(&first, version, object.about.len));
+    let on_disk = version.map(|(cache, version)| cache.object(&name, (&first, version, object.about.len)));
     Ok(Paged::new(object, on_disk).begun(&first))
 }
 
@@ -54,20 +56,44 @@ pub(super) struct Object {
     address: Address,
     agent: Agent,
     about: About,
+    turns: Turns,
+}
+
+/// Lets some requests pass at a time, whatever the number of threads that make them.
+#[derive(Debug)]
+struct Turns {
+    free: Mutex<usize>,
+    left: Condvar,
+}
+
+impl Turns {
+    fn new(free: usize) -> Self {
+        Self { free: Mutex::new(free), left: Condvar::new() }
+    }
+
+    fn take<T>(&self, request: impl FnOnce() -> T) -> T {
+        let free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        *self.left.wait_while(free, |free| *free == 0).unwrap_or_else(PoisonError::into_inner) -= 1;
+        let answer = request();
+        *self.free.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        self.left.notify_one();
+        answer
+    }
 }
 
 impl Object {
     /// Opens an object, and returns its first bytes with it.
     fn open(address: Address, timeout: Duration) -> io::Result<(Self, Vec<u8>)> {
         let agent = agent(&address, timeout);
-        let opening = Self { address, agent, about: About::default() };
+        let opening = Self { address, agent, about: About::default(), turns: Turns::new(SIDE_BY_SIDE) };
         let (about, first) = patiently(|| opening.ask(&(0..FIRST), None))?;
         Ok((Self { about, ..opening }, first))
     }
 
     /// Reads a range within the object.
     fn read(&self, range: &Range<u64>) -> io::Result<Vec<u8>> {
-        patiently(|| self.ask(range, Some(&self.about))).map(|(_, bytes)| bytes)
+        let ask = || self.turns.take(|| self.ask(range, Some(&self.about)));
+        patiently(ask).map(|(_, bytes)| bytes)
     }
 
     /// Asks once for a range. `known` is what is known of the object.
@@ -98,7 +124,7 @@ impl Object {
             let plain: String = message.chars().filter(|letter| !letter.is_control()).take(200).collect();
             format!(": {plain}")
         });
-        let advice = if matches!(status, 301 | 400..404) { self.address.advice() } else { "" };
+        let advice = if matches!(status, 400..404) { self.address.advice() } else { "" };
         Failure::Final(io::Error::new(error.kind(), format!("{error}{message}{advice}")))
     }
 }
@@ -180,6 +206,7 @@ fn agent(address: &Address, timeout: Duration) -> Agent {
     let config = Agent::config_builder()
         .http_status_as_error(false)
         .https_only(address.is_encrypted())
+        .redirect_auth_headers(RedirectAuthHeaders::SameHost)
         .tls_config(tls)
         .user_agent(concat!("wavesplat/", env!("CARGO_PKG_VERSION")))
         .accept_encoding("identity")
@@ -226,6 +253,9 @@ fn failure(error: ureq::Error) -> Failure {
         }
         ureq::Error::Io(error) => Failure::Passing(error, None),
         ureq::Error::ConnectionFailed => Failure::Passing(io::Error::other("no connection to the server"), None),
-        other => Failure::last(other.to_string()),
+        other if other.to_string().contains("missing a location") => Failure::last(
+            "the server says that it is elsewhere, but not where; AWS_REGION may not be that of the bucket",
+        ),
+        _ => Failure::last("the server's answer is not understood"), // its text may hold a signed address
     }
 }

@@ -14,7 +14,29 @@ const MOST: usize = 2048;
 /// Pages that [`Storage::fetch`] brings at a time, so that they stay until they are used.
 const AHEAD: usize = MOST / 2;
 
-/// Bytes that should be fetched at a time: with what lies between them, they fit into memory.
+/// Counts the pages of ranges that are to be fetched together.
+#[derive(Debug, Default)]
+pub(crate) struct PageCount {
+    pages: usize,
+    /// The page that was counted last.
+    last: Option<u64>,
+}
+
+impl PageCount {
+    /// Counts the pages of a range that the range before does not end with.
+    pub(crate) fn add(&mut self, range: &Range<u64>) {
+        let pages = numbers(range);
+        self.pages += pages.clone().count() - usize::from(self.last.is_some_and(|last| pages.contains(&last)));
+        self.last = pages.last().or(self.last);
+    }
+
+    /// Whether there are as many as are fetched at a time.
+    pub(crate) fn is_full(&self) -> bool {
+        self.pages >= AHEAD / 2
+    }
+}
+
+/// Bytes from one place on that are fetched at a time.
 pub(crate) const FETCHED: u64 = AHEAD as u64 * PAGE / 2;
 
 /// A storage that is read in pages. Those read last stay in memory, and on a disk if there is a cache; several threads may
@@ -100,7 +122,8 @@ impl<S: Storage> Paged<S> {
     #[cfg_attr(not(feature = "remote"), allow(dead_code, reason = "only objects of servers have this"))]
     pub(super) fn begun(self, first: &[u8]) -> Self {
         let pages = cut(&(0..first.len() as u64), first);
-        let whole = pages.filter(|(page, bytes)| place(*page, self.storage.len()).end == page * PAGE + bytes.len());
+        let whole = pages
+            .filter(|(page, bytes)| place(*page, self.storage.len()).end == page * PAGE + <[u8]>::len(bytes) as u64);
         whole.for_each(|(page, bytes)| self.lock().keep(page, bytes.into()));
         self
     }
@@ -153,13 +176,14 @@ impl<S: Storage> Paged<S> {
     fn read(&self, missing: &[u64], found: &mut BTreeMap<u64, Page>) -> io::Result<()> {
         let runs = runs(missing, self.storage.len());
         let read = self.storage.read_many(&runs)?;
+        check_lengths(&runs, &read)?;
         for (page, bytes) in runs.iter().zip(&read).flat_map(|(run, bytes)| cut(run, bytes)) {
             if let Some(disk) = &self.on_disk {
                 disk.store(page, bytes);
             }
-            let bytes: Page = bytes.into();
-            self.lock().keep(page, bytes.clone());
             if missing.binary_search(&page).is_ok() {
+                let bytes: Page = bytes.into();
+                self.lock().keep(page, bytes.clone());
                 found.insert(page, bytes);
             }
         }
@@ -178,11 +202,20 @@ impl<S: Storage> Paged<S> {
     }
 }
 
+/// An error unless a storage gave all that it was asked for.
+fn check_lengths(asked: &[Range<u64>], read: &[Vec<u8>]) -> io::Result<()> {
+    let lengths = asked.iter().map(|range| range.end - range.start);
+    match lengths.eq(read.iter().map(|bytes| bytes.len() as u64)) {
+        true => Ok(()),
+        false => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the storage gave too few bytes")),
+    }
+}
+
 /// Copies a range from its pages.
 fn copy(pages: &BTreeMap<u64, Page>, range: &Range<u64>, out: &mut [u8]) {
     for number in numbers(range) {
         let (start, bytes) = (number * PAGE, &pages[&number]);
-        let (from, to) = (range.start.max(start), range.end.min(start + bytes.len()));
+        let (from, to) = (range.start.max(start), range.end.min(start + <[u8]>::len(bytes) as u64));
         if from < to {
             out[(from - range.start) as usize..(to - range.start) as usize]
                 .copy_from_slice(&bytes[(from - start) as usize..(to - start) as usize]);

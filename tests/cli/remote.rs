@@ -149,13 +149,13 @@ fn lasting_faults_are_explained() {
         (refuse(401, ""), vec!["a name and a password (401)"]),
         (refuse(416, ""), vec!["empty (416)"]),
         (refuse(503, ""), vec!["cannot answer now (503)", "asked 5 times"]),
-        (refuse(302, ""), vec!["location"]),
+        (refuse(302, ""), vec!["elsewhere, but not where"]),
         (Fate::Refuse(302, "Location: /run.wspl\r\n".into(), String::new()), vec!["again and again"]),
         (Fate::Cut(100), vec!["asked 5 times"]),
         (Fate::Shifted, vec!["sends bytes 1.."]),
         (Fate::Silent, vec!["does not answer in time", "asked 5 times"]),
         (Fate::Drip, vec!["does not answer in time"]),
-        (Fate::Nonsense, vec!["error: http://127.0.0.1"]),
+        (Fate::Nonsense, vec!["not understood"]),
         (Fate::Endless, vec!["sends more than"]),
     ] {
         let (shown, begin) = (format!("{fate:?}"), Instant::now());
@@ -258,6 +258,8 @@ fn what_is_not_done_on_servers_is_said() {
     for (line, words) in [
         ("convert https://127.0.0.1:9/a.npy -o a.wspl", vec!["frames are not read from servers"]),
         ("convert run.wspl -o s3://lab/run.wspl", vec!["s3://lab/run.wspl", "aws s3 cp -"]),
+        ("recover https://127.0.0.1:9/run.wspl -o a.wspl", vec!["file of this machine"]),
+        ("append https://127.0.0.1:9/run.wspl run.wspl", vec!["not written to servers"]),
         ("extract run.wspl -o https://127.0.0.1/a.npy", vec!["not written to servers"]),
     ] {
         work.wavesplat(line).fails(2, &words);

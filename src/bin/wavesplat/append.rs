@@ -3,6 +3,7 @@
 use super::convert::finish;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat::base::address::refuse_output;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{STANDARD, part_of};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
@@ -54,6 +55,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let linked = args.file.is_symlink().then(|| args.file.canonicalize()).transpose();
     let linked = linked.map_err(|e| Error::io(&args.file, "opening", e))?;
     let path = linked.unwrap_or(args.file.clone()); // replaces the file, not the link to it
+    refuse_output(&path)?;
     let file = CoefficientFile::open_with(&path, args.input.access())?;
     if args.inputs.iter().all(|input| is_shard(input)) {
         return args.append_shards(&file);

@@ -6,6 +6,7 @@ use super::ranges;
 use super::scene::Opened;
 use super::work::Work;
 use super::{Prepared, parsed};
+use crate::base::address::public_name;
 use crate::base::error::{Error, Result};
 use crate::cli::remote::KeptOpen;
 use crate::colour::Distribution;
@@ -112,7 +113,8 @@ impl Scenery {
         let grid = file.as_ref().map_or(*scene.grid(), |file| file.whole_grid());
         let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
-        let name = self.inputs.first().and_then(|input| Path::new(input).file_name());
+        let name = self.inputs.first().map(|input| public_name(Path::new(input)));
+        let name = name.as_deref().and_then(Path::file_name);
         Ok(Facts {
             live: true,
             title: name.unwrap_or_default().to_string_lossy().into_owned(),

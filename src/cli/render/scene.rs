@@ -3,6 +3,7 @@
 use super::annotations::values_of;
 use super::args::{Cli, Detail, Exaggeration, MethodName};
 use super::places::Axes;
+use crate::base::address::public_name;
 use crate::base::description::{coordinates, is_regular};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
@@ -164,7 +165,7 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
     }
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
     if !is_coefficient_name(path) && (foreign || path.is_dir()) {
-        return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", path.display()));
+        return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", public_name(path).display()));
     }
     error
 }

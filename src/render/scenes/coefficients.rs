@@ -52,7 +52,10 @@ impl CoefficientScene {
         let region = config.region.unwrap_or(file.grid.whole());
         file.fetch_leaves_of(windows.clone().map(|frames| file.window_of(frames[0])), channel, &region)?;
         if !config.mode.is_projection() {
-            return Ok(()); // which blocks are hidden is known later
+            // Which blocks are hidden is known later.
+            let last = windows.last().map_or(0, |frames| frames[frames.len() - 1]);
+            self.fetched[channel] = last + 1;
+            return Ok(());
         }
         let mut gathered = Gathered::default();
         for frames in windows {
@@ -325,9 +328,15 @@ impl FrameBatch for CoefficientBatch<'_> {
         if !self.file.is_remote() {
             return Ok(());
         }
-        let entry = |block: &usize| self.kept(*block).map(|kept| kept.entry);
-        let entries = blocks.iter().map(entry).collect::<Result<Vec<_>>>()?;
-        self.file.fetch_blocks(&self.plan.codec, &entries, &self.plan.wanted)
+        let BatchPlan { codec, wanted, .. } = &self.plan;
+        let mut gathered = Gathered::default();
+        for block in blocks {
+            gathered.add(Block::parts(codec, &self.kept(*block)?.entry, wanted).copied());
+            if gathered.is_full() {
+                break;
+            }
+        }
+        self.file.fetch_gathered(&gathered)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

@@ -6,7 +6,7 @@ use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, is_missing};
 use crate::codec::WindowCodec;
 use crate::codec::decode::Block;
-use crate::file::{CoefficientFile, Gathered};
+use crate::file::{CoefficientFile, Gathered, WINDOWS_TOGETHER};
 use crate::render::overview::OverviewRequest;
 use crate::source::FrameWindow;
 use crate::wavelet;
@@ -45,8 +45,12 @@ fn fetch(file: &CoefficientFile, request: &OverviewRequest<'_>, windows: &[&[usi
     }
     let mut gathered = Gathered::default();
     for channel in 0..file.channels() {
+        let windows = &windows[..windows.len().min(WINDOWS_TOGETHER)];
         file.fetch_leaves_of(windows.iter().map(|frames| file.window_of(frames[0])), channel, &request.region)?;
         for frames in windows {
+            if gathered.is_full() {
+                break;
+            }
             let (window, codec, frames) = coarse(file, request, frames)?;
             let wanted = wavelet::needed(&codec.synthesis, &frames);
             for entries in file.entries(window, channel, &request.region) {

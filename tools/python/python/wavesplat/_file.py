@@ -427,5 +427,5 @@ def _reopened(path: str, lod: int, id: str, cache_dir: str | PathLike[str] | Non
     """A file that was pickled, if it is still the same."""
     file = File(path, lod=lod, cache_dir=cache_dir)
     if file.id != id:
-        raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled")
+        raise _wavesplat.ChangedError(f"{file._file.path}: is another file than the one that was pickled")
     return file
