@@ -23,8 +23,8 @@ pub enum Error {
         /// What is wrong.
         what: String,
     },
-    /// A block whose data were missing when the file was recovered from a damaged one.
-    #[error("{0}: lost before the file was recovered")]
+    /// A block whose data were missing or damaged when the file was recovered or merged.
+    #[error("{0}: lost before the file was written")]
     Lost(BlockId),
     /// Written by a newer version, or with a feature that this reader lacks.
     #[error("not supported: {0}")]

@@ -28,6 +28,10 @@ pub(crate) fn refuse_address(path: &Path) -> Result<()> {
     if is_address(path) {
         return Err(Error::path(public_name(path), "must be a file of this machine; download it"));
     }
+    if path.to_string_lossy().contains("://") && !path.exists() {
+        let what = "is no address of a kind that is known: https://, http:// and s3:// are";
+        return Err(Error::path(public_name(path), what));
+    }
     Ok(())
 }
 

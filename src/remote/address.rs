@@ -49,6 +49,14 @@ impl Address {
         }
     }
 
+    /// The server, if the address does not say it.
+    pub(super) fn server(&self) -> Option<&str> {
+        match self {
+            Self::Http { .. } => None,
+            Self::S3(s3) => s3.bucket.base_url().host_str(),
+        }
+    }
+
     pub(super) fn authorization(&self) -> Option<&str> {
         match self {
             Self::Http { authorization, .. } => authorization.as_deref(),

@@ -44,7 +44,8 @@ const MOST_WORDS: u64 = 4096;
 pub(super) fn open(address: &Path, options: &RemoteOptions) -> error::Result<Paged<Object>> {
     let name = public_name(address);
     let of = Address::parse(&address.to_string_lossy()).map_err(|what| Error::path(&name, what))?;
-    let (object, first) = Object::open(of, options.timeout).map_err(|e| Error::io(&name, "opening", e))?;
+    let doing = of.server().map_or("opening".into(), |server| format!("opening at {server}"));
+    let (object, first) = Object::open(of, options.timeout).map_err(|e| Error::io(&name, doing, e))?;
     let version = options.cache.as_ref().zip(object.about.version());
     let on_disk = version.map(|(cache, version)| cache.object(&name, (&first, version, object.about.len)));
     Ok(Paged::new(object, on_disk).begun(&first))

@@ -385,3 +385,19 @@ fn with_text(part: &[u8], text: &[u8]) -> Vec<u8> {
     let end = numbers.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>();
     [&part[..8], &packed, &end, &part[..8]].concat()
 }
+
+#[test]
+fn what_a_part_left_out_as_damaged_is_said_of_its_sums() {
+    let work = Work::new();
+    work.write("a.npy", Archive::smooth([20, 14, 10], 16).npy());
+    work.wavesplat("convert a.npy -o a.wspl --window 8 --block 8").ok();
+    let mut bytes = work.read("a.wspl");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    work.write("a.wspl", &bytes);
+    work.render("a.wspl --skip-damaged --partial --size 20x20 -o a.wpart").fails(3, &["damaged blocks were left out"]);
+    work.render("--sum a.wpart -o a_%02d.png").fails(3, &["a.wpart: a.wspl: ", "damaged blocks were left out"]);
+    work.render("--sum a.wpart --partial -o b.wpart").fails(3, &["b.wpart: lacks"]);
+    work.render("--sum b.wpart --frames 3 -o b.png").fails(3, &["b.wpart"]);
+    assert!(work.names().contains(&"a_15.png".into()));
+}

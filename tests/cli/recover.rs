@@ -71,7 +71,7 @@ fn a_damaged_block_is_lost_and_all_others_are_shown() {
     bad[at] ^= 1;
     work.write("bad.wspl", &bad);
     work.wavesplat("recover bad.wspl -o saved.wspl").finds(3, &["1 of 120 blocks are lost"]);
-    work.wavesplat("verify saved.wspl").finds(3, &["window 1 block 7", "lost before the file was recovered"]);
+    work.wavesplat("verify saved.wspl").finds(3, &["window 1 block 7", "lost before the file was written"]);
     work.wavesplat("verify bad.wspl").finds(3, &["window 1 block 7", "checksum"]);
     let shown = |name: &str| {
         let reading = format!("extract {name} -o out.npy --force");

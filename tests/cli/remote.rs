@@ -260,6 +260,7 @@ fn what_is_not_done_on_servers_is_said() {
         ("convert run.wspl -o s3://lab/run.wspl", vec!["s3://lab/run.wspl", "aws s3 cp -"]),
         ("recover https://127.0.0.1:9/run.wspl -o a.wspl", vec!["file of this machine"]),
         ("append https://127.0.0.1:9/run.wspl run.wspl", vec!["not written to servers"]),
+        ("info gs://lab/run.wspl", vec!["is no address of a kind that is known"]),
         ("extract run.wspl -o https://127.0.0.1/a.npy", vec!["not written to servers"]),
     ] {
         work.wavesplat(line).fails(2, &words);

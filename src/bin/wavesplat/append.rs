@@ -57,7 +57,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let path = linked.unwrap_or(args.file.clone()); // replaces the file, not the link to it
     refuse_output(&path)?;
     let file = CoefficientFile::open_with(&path, args.input.access())?;
-    if args.inputs.iter().all(|input| is_shard(input)) {
+    if args.inputs.iter().map(|input| is_shard(input)).collect::<Result<Vec<_>>>()?.iter().all(|is_shard| *is_shard) {
         return args.append_shards(&file);
     }
     let config = args.config(&file)?;
@@ -89,9 +89,9 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
 }
 
 /// Whether an input is a shard, which is copied; other coefficient files are sources like any other.
-fn is_shard(input: &Path) -> bool {
+fn is_shard(input: &Path) -> Result<bool> {
     let is_named = input.extension().is_some_and(|extension| extension == "wspl");
-    is_named && CoefficientFile::open(input).is_ok_and(|file| frames_of_shard(&file).is_some())
+    Ok(is_named && frames_of_shard(&CoefficientFile::open(input)?).is_some())
 }
 
 impl AppendArgs {

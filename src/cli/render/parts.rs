@@ -186,13 +186,15 @@ impl Cli {
                 writer.put(numbered(sums, &views, first))
             })?,
         };
-        writer.finish(report.certified_sample_error)?.commit()?;
+        let skipped = file.refuse_skipped();
+        let damage = skipped.as_ref().err().map(ToString::to_string);
+        writer.finish(report.certified_sample_error, damage)?.commit()?;
         self.common.detail(summary(&report));
         self.common.detail_read(file.bytes_read(), file.bytes());
         let (file_bytes_read, file_bytes) = (file.bytes_read(), file.bytes());
         let of_part = PartReport { report: &report, voxels, frame_numbers: &frames, file_bytes_read, file_bytes };
         self.common.report(&of_part, false)?;
-        file.refuse_skipped()
+        skipped
     }
 
     /// An error if the pictures are not sums.
@@ -267,9 +269,12 @@ impl Cli {
         let progress = progress.unwrap_or(&terminal);
         if self.parts.partial {
             total.join(&frames, (&self.output, self.part_output()?), progress)?.commit()?;
-            return self.common.report(&Summed::of(&total), false);
+            self.common.report(&Summed::of(&total), false)?;
+        } else {
+            self.write_pictures(&total, &frames, progress)?;
         }
-        self.write_pictures(&total, &frames, progress)
+        let lacks = |damage| Err(Error::input(&self.output, format!("lacks what a part left out: {damage}")));
+        total.damage().map_or(Ok(()), lacks)
     }
 
     /// Says what the parts lack.

@@ -93,6 +93,8 @@ pub struct Head {
     pub sources: Vec<Source>,
     /// Error bound of every splatted sample.
     pub sample_error: f64,
+    /// What was left out as damaged, if anything was.
+    pub damage: Option<String>,
     /// The weights of views.
     pub(super) weights: Vec<WeightRecord>,
     /// The sums of pictures.

@@ -2,6 +2,7 @@
 
 use super::look::{Head, PictureRecord, Place, SCHEMA};
 use super::{END, MAGIC};
+use crate::base::address::refuse_address;
 use crate::base::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, Read};
@@ -38,6 +39,7 @@ impl PartFile {
     /// # Errors
     /// A file that cannot be read, is no part, is damaged, or whose numbers contradict each other.
     pub fn open(path: &Path, memory: usize) -> Result<Self> {
+        refuse_address(path)?;
         let doing = |e| Error::io(path, "reading", e);
         let length = std::fs::metadata(path).map_err(doing)?;
         if !length.is_file() {

@@ -124,6 +124,12 @@ impl Total {
         Head::time_labels(self.look(), &self.sources())
     }
 
+    /// What a part left out as damaged, if any did.
+    pub fn damage(&self) -> Option<String> {
+        let damage = |part: &PartFile| Some(format!("{}: {}", part.path().display(), part.head.damage.as_ref()?));
+        self.parts.iter().find_map(damage)
+    }
+
     /// Error bound of every splatted sample.
     pub fn sample_error(&self) -> f64 {
         self.parts.iter().map(|part| part.head.sample_error).fold(0.0, f64::max)
@@ -222,7 +228,7 @@ impl Total {
             }
         }
         progress.finish();
-        writer.finish(self.sample_error())
+        writer.finish(self.sample_error(), self.damage())
     }
 
     /// The pictures of a view that show some of the frames.

@@ -31,7 +31,8 @@ impl<W: Write> PartWriter<W> {
     pub fn new((name, mut out): (&Path, W), look: Look, (boxes, sources): (Vec<Region>, Vec<Source>)) -> Result<Self> {
         let software = concat!("wavesplat-render ", env!("CARGO_PKG_VERSION")).into();
         let (weights, pictures) = (Vec::new(), Vec::new());
-        let head = Head { schema: SCHEMA, software, look, boxes, sources, sample_error: 0.0, weights, pictures };
+        let head =
+            Head { schema: SCHEMA, software, look, boxes, sources, sample_error: 0.0, damage: None, weights, pictures };
         head.check(0).map_err(|what| Error::path(name, what))?;
         out.write_all(&MAGIC).map_err(|e| Error::io(name, "writing", e))?;
         Ok(Self { out, name: name.into(), at: MAGIC.len() as u64, head })
@@ -55,12 +56,12 @@ impl<W: Write> PartWriter<W> {
         Ok(())
     }
 
-    /// Ends the part. No splatted sample is off by more than `sample_error`.
+    /// Ends the part. No splatted sample is off by more than `sample_error`, but for what was left out as damaged.
     ///
     /// # Errors
     /// Failed writes.
-    pub fn finish(mut self, sample_error: f64) -> Result<W> {
-        self.head.sample_error = sample_error;
+    pub fn finish(mut self, sample_error: f64, damage: Option<String>) -> Result<W> {
+        (self.head.sample_error, self.head.damage) = (sample_error, damage);
         let failed = |e: io::Error| Error::io(&self.name, "writing", e);
         let json = serde_json::to_vec(&self.head).map_err(|e| failed(e.into()))?;
         let packed = zstd::bulk::compress(&json, LEVEL).map_err(failed)?;
