@@ -154,9 +154,10 @@ def slow(samples):
 
 
 INTERRUPTED = """
-    import sys, time
+    import signal, sys, time
     import numpy as np
     import wavesplat
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
     samples = np.load("a.npy")
     class Slow:
         shape, dtype = samples.shape, samples.dtype

@@ -103,7 +103,9 @@ def test_the_viewer_answers_until_it_is_closed(file):
 
 
 LONG = """
+    import signal
     import wavesplat
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
     def report(done, steps):
         print("began", flush=True)
     wavesplat.open("{path}").render(mode="composite", size=(1500, 1500), slices=8, progress=report)
