@@ -43,6 +43,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 33] = [
             "render/scenes/overview.rs",
             "extract/mod.rs",
             "file/fetch.rs",
+            "file/check.rs",
             "file/coefficient_file.rs",
             "file/repack.rs",
             "file/verify.rs",

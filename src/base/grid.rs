@@ -3,6 +3,7 @@
 //! Triples are in the order x, y, z; arrays have x fastest, then y, z, and time slowest.
 
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// A regular grid of voxels in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -75,6 +76,14 @@ pub struct Region {
     pub start: [usize; 3],
     /// One past the last voxel along x, y, z.
     pub end: [usize; 3],
+}
+
+impl fmt::Display for Region {
+    /// Writes `x0:x1,y0:y1,z0:z1`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { start: [x, y, z], end: [u, v, w] } = self;
+        write!(f, "{x}:{u},{y}:{v},{z}:{w}")
+    }
 }
 
 impl Region {

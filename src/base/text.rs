@@ -19,6 +19,18 @@ pub fn read(path: &Path, kind: &str) -> Result<String> {
     of(bytes, kind).map_err(|what| Error::input(path, what))
 }
 
+/// Bytes of which some were written as `%` and two hexadecimal digits. A `%` before anything else stays.
+pub(crate) fn percent_decoded(text: &str) -> Vec<u8> {
+    let (mut bytes, mut rest) = (Vec::new(), text.as_bytes());
+    while let [first, after @ ..] = rest {
+        let code = after.get(..2).and_then(|hex| std::str::from_utf8(hex).ok());
+        let byte = code.and_then(|hex| u8::from_str_radix(hex, 16).ok()).filter(|_| *first == b'%');
+        bytes.push(byte.unwrap_or(*first));
+        rest = if byte.is_some() { &after[2..] } else { after };
+    }
+    bytes
+}
+
 /// The text of the bytes of a file.
 pub(crate) fn of(bytes: Vec<u8>, kind: &str) -> std::result::Result<String, String> {
     if bytes.len() as u64 > MOST_BYTES {
@@ -27,4 +39,14 @@ pub(crate) fn of(bytes: Vec<u8>, kind: &str) -> std::result::Result<String, Stri
     let text = String::from_utf8(bytes).map_err(|_| format!("is not text, which a {kind} is expected to be"))?;
     let text = text.strip_prefix('\u{feff}').map_or(text.clone(), String::from); // some editors write it
     if text.trim().is_empty() { Err(format!("is empty, where a {kind} is expected")) } else { Ok(text) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_in_hexadecimal_become_plain() {
+        assert_eq!(percent_decoded("a%2Fb%%zz%4"), b"a/b%%zz%4");
+    }
 }

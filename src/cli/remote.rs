@@ -20,10 +20,10 @@ pub struct RemoteArgs {
     /// Folder that keeps what was read of remote files, for later runs; several programs may use it at once
     #[arg(long, value_name = "DIR", help_heading = "Remote files")]
     cache: Option<PathBuf>,
-    /// Room of the cache: what was not used for longest makes way
+    /// Largest size of the cache; what was not used for longest is removed first
     #[arg(long, value_name = "SIZE", default_value = "4GiB", help_heading = "Remote files")]
     cache_size: Size,
-    /// How long a server may be silent. Requests are repeated, so a program may wait for several times as long
+    /// How long a server may be silent before a request is repeated; five requests are made
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds, help_heading = "Remote files")]
     timeout: f64,
     #[arg(skip)]

@@ -148,6 +148,12 @@ pub struct FrameRange {
     step: usize,
 }
 
+impl From<std::ops::Range<u64>> for FrameRange {
+    fn from(frames: std::ops::Range<u64>) -> Self {
+        Self { start: i64::try_from(frames.start).ok(), end: i64::try_from(frames.end).ok(), step: 1 }
+    }
+}
+
 impl FromStr for FrameRange {
     type Err = String;
 

@@ -7,7 +7,7 @@
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
 use crate::base::sample::{self, join_ranges};
-use crate::file::merge::{SHARD, SHARD_OF};
+use crate::file::shard::{SHARD, SHARD_OF};
 use crate::source::scan::scan;
 use crate::source::{Archive, FrameSource, Selection, select};
 use serde::{Deserialize, Serialize};

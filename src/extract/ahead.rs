@@ -1,10 +1,9 @@
 //! Pieces of a remote file that are fetched before they are decoded, many in few requests.
 
-use super::Piece;
+use super::{InWindow, Piece};
 use crate::base::error::Result;
 use crate::codec::decode::Block;
 use crate::file::{CoefficientFile, Gathered, WINDOWS_TOGETHER};
-use crate::wavelet;
 use wavesplat_format::{BlockEntry, PartEntry};
 
 /// How far decoding and fetching have come in a list of pieces.
@@ -52,10 +51,7 @@ fn windows<'a>(file: &'a CoefficientFile, piece: &'a Piece) -> impl Iterator<Ite
 
 /// The parts of the blocks of a piece that frames of one window need.
 fn parts_of(file: &CoefficientFile, channel: usize, (piece, frames): (&Piece, &[usize])) -> Result<Vec<PartEntry>> {
-    let window = file.window_of(frames[0]);
-    let (codec, first) = (file.codec(window)?, file.window_range(window).start);
-    let frames: Vec<usize> = frames.iter().map(|frame| frame - first).collect();
-    let wanted = wavelet::needed(&codec.synthesis, &frames);
+    let InWindow { window, codec, wanted, .. } = InWindow::new(file, frames)?;
     let of_block = |entry: &BlockEntry| Block::parts(&codec, entry, &wanted).copied().collect::<Vec<_>>();
     let mut parts = Vec::new();
     for entries in file.entries(window, channel, &piece.region) {

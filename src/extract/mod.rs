@@ -255,6 +255,25 @@ struct Target {
     first: usize,
 }
 
+/// Frames of one window, and what decoding them takes.
+struct InWindow {
+    window: u32,
+    codec: WindowCodec,
+    /// Their numbers in the window.
+    frames: Vec<usize>,
+    /// The coefficients that they need.
+    wanted: Vec<bool>,
+}
+
+impl InWindow {
+    fn new(file: &CoefficientFile, frames: &[usize]) -> Result<Self> {
+        let window = file.window_of(frames[0]);
+        let (codec, first) = (file.codec(window)?, file.window_range(window).start);
+        let frames: Vec<usize> = frames.iter().map(|frame| frame - first).collect();
+        Ok(Self { window, wanted: crate::wavelet::needed(&codec.synthesis, &frames), codec, frames })
+    }
+}
+
 /// Reads the samples of a piece in frames of one window.
 fn read_window(
     file: &CoefficientFile,
@@ -265,11 +284,7 @@ fn read_window(
     out: &mut [u8],
     report: &mut ExtractReport,
 ) -> Result<()> {
-    let window = file.window_of(frames[0]);
-    let codec = file.codec(window)?;
-    let first = file.window_range(window).start;
-    let frames: Vec<usize> = frames.iter().map(|f| f - first).collect();
-    let wanted = crate::wavelet::needed(&codec.synthesis, &frames);
+    let InWindow { window, codec, frames, wanted } = InWindow::new(file, frames)?;
     for entries in file.entries(window, channel, &target.region) {
         for entries in entries?.chunks(at_once) {
             file.fetch_blocks(&codec, entries, &wanted)?;

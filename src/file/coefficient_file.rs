@@ -12,6 +12,7 @@ use crate::codec::coarse;
 use crate::codec::decode::Block;
 use crate::file::counted::Counted;
 use crate::file::detail;
+use crate::file::fetch::BLOCKS_TOGETHER;
 use crate::file::promise;
 use crate::remote::{self, RemoteFile, RemoteOptions};
 use crate::source::{CHANNELS, ColourTransform};
@@ -20,10 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, BlockId, CompletePrefix, FileId, LeafEntry, Metadata, Reader, Storage};
-
-/// Blocks of a remote file that are fetched together to be checked.
-const TOGETHER: usize = 32;
+use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage};
 
 /// An open coefficient file; several threads may read it.
 #[derive(Debug)]
@@ -287,7 +285,7 @@ impl CoefficientFile {
         let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
         let leaves: Vec<_> = leaves.copied().collect();
         let found = match self.is_remote() {
-            true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // so that pages stay
+            true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // threads would push out each other's pages
             false => leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?,
         };
         self.skipped = Some(Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() });
@@ -302,7 +300,7 @@ impl CoefficientFile {
             Ok(entries) => entries,
         };
         let mut found = Vec::new();
-        for entries in entries.chunks(TOGETHER) {
+        for entries in entries.chunks(BLOCKS_TOGETHER) {
             self.fetch_whole(entries)?;
             for entry in entries {
                 match self.reader.check_stored(entry) {
@@ -411,53 +409,6 @@ impl CoefficientFile {
     ) -> Result<Vec<f32>> {
         let (size, stride) = (self.all_voxels(entry)?, stride << self.lod);
         coarse::thinned(&self.reader, codec, entry, size, (stride, frames)).map_err(|e| self.failed(e))
-    }
-
-    /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.
-    pub(crate) fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
-        self.reader.check_structure(&mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
-    }
-
-    /// Checks every byte of consecutive blocks, the first of which begins at `at`, that is in no part; `found` is told what
-    /// is wrong. Returns where the next block begins.
-    pub(crate) fn check_blocks(&self, at: u64, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<u64> {
-        let mut found = |wrong| found(self.failed(wrong));
-        self.reader.check_blocks(at, blocks, &mut found).map_err(|e| self.failed(e))
-    }
-
-    /// Checks the padding behind a leaf; `found` is told if it is wrong.
-    pub(crate) fn check_leaf_end(&self, leaf: &LeafEntry, found: &mut dyn FnMut(Error)) -> Result<()> {
-        let mut found = |wrong| found(self.failed(wrong));
-        self.reader.check_leaf_end(leaf, &mut found).map_err(|e| self.failed(e))
-    }
-
-    /// Compares the checksums of every byte of the file; the first error. Of blocks that are lost there is nothing to check.
-    pub fn check_stored(&self) -> Result<()> {
-        let mut wrong = None;
-        let mut found = |error| wrong = wrong.take().or(Some(error));
-        self.check_structure(&mut found)?;
-        for leaf in (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window)) {
-            let mut at = leaf.data_offset;
-            for entries in self.leaf(leaf)?.chunks(TOGETHER) {
-                self.fetch_whole(entries)?;
-                at = self.check_blocks(at, entries, &mut found)?;
-                let present = entries.par_iter().filter(|entry| !entry.lost);
-                present.try_for_each(|entry| self.reader.check_stored(entry)).map_err(|e| self.failed(e))?;
-            }
-            self.check_leaf_end(leaf, &mut found)?;
-        }
-        wrong.map_or(Ok(()), Err)
-    }
-
-    /// All of its windows, once every byte of them was seen to be whole.
-    pub(crate) fn whole_windows(&self) -> Result<CompletePrefix> {
-        let whole = CompletePrefix::read(self.reader.storage()).map_err(|e| self.failed(e))?;
-        match whole.metadata() == self.metadata() {
-            true => Ok(whole),
-            false => {
-                self.check_stored().and(Err(self.contradiction("windows that the metadata does not tell of".into())))
-            }
-        }
     }
 
     /// Bytes of the file that were read so far.

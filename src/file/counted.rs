@@ -40,12 +40,6 @@ impl Storage for Counted {
         Ok(())
     }
 
-    fn read_many(&self, ranges: &[Range<u64>]) -> io::Result<Vec<Vec<u8>>> {
-        let read = self.storage.read_many(ranges)?;
-        self.read.fetch_add(read.iter().map(|bytes| bytes.len() as u64).sum(), Relaxed);
-        Ok(read)
-    }
-
     fn fetch(&self, ranges: &[Range<u64>]) -> io::Result<()> {
         self.storage.fetch(ranges)
     }

@@ -10,6 +10,9 @@ use rayon::prelude::*;
 use std::ops::Range;
 use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
 
+/// Blocks that are fetched together to be checked.
+pub(super) const BLOCKS_TOGETHER: usize = 32;
+
 /// Windows whose leaves are fetched together.
 pub(crate) const WINDOWS_TOGETHER: usize = 256;
 
@@ -53,11 +56,6 @@ impl CoefficientFile {
         self.reader.storage().fetch(&ranges).map_err(|e| self.failed(e.into()))
     }
 
-    /// Fetches leaves of the directory that will be read soon.
-    pub(crate) fn fetch_leaves<'a>(&self, leaves: impl Iterator<Item = &'a LeafEntry>) -> Result<()> {
-        self.fetch(leaves.map(LeafEntry::bytes))
-    }
-
     /// Fetches the leaves of a channel of some windows that list blocks of a region.
     pub(crate) fn fetch_leaves_of(
         &self,
@@ -65,10 +63,7 @@ impl CoefficientFile {
         channel: usize,
         region: &Region,
     ) -> Result<()> {
-        if !self.is_remote() {
-            return Ok(());
-        }
-        self.fetch_leaves(windows.flat_map(|window| self.reached(window, channel, region)))
+        self.fetch(windows.flat_map(|window| self.reached(window, channel, region)).map(LeafEntry::bytes))
     }
 
     /// Fetches the bytes of a remote file from `offset` on, as many as it keeps; returns where they end.

@@ -2,6 +2,7 @@
 //! stored, with new checksums; nothing is coded anew. The merged file has the bytes of one conversion.
 
 use super::CoefficientFile;
+use super::shard::{Place, SHARD, without_shard};
 use crate::base::description::{Description, extended, joined};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
@@ -14,10 +15,6 @@ use wavesplat_format::{
     BlockEntry, BlockId, CompletePrefix, EncodedBlock, Features, LeafEntry, Metadata, Window, WindowEnd, WindowRecord,
     Writer,
 };
-
-/// The settings of a shard: which of how many it is, and its frames of how many.
-pub(crate) const SHARD: &str = "shard";
-pub(crate) const SHARD_OF: &str = "shard-of";
 
 /// What was merged.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -40,36 +37,6 @@ pub struct MergeReport {
     pub input_bytes: u64,
     /// Bytes of the merged file.
     pub output_bytes: u64,
-}
-
-/// The place of a shard, as its settings say it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Place {
-    number: usize,
-    of: usize,
-    frames: Range<u64>,
-    all: u64,
-}
-
-impl Place {
-    fn of(file: &CoefficientFile) -> Result<Self> {
-        let named = |name| super::setting(file.metadata(), name);
-        let place = named(SHARD).zip(named(SHARD_OF)).and_then(|(shard, frames)| {
-            let (number, of) = shard.split_once('/')?;
-            let (frames, all) = frames.split_once('/')?;
-            let (start, end) = frames.split_once(':')?;
-            let frames = start.parse().ok()?..end.parse().ok()?;
-            Some(Self { number: number.parse().ok()?, of: of.parse().ok()?, frames, all: all.parse().ok()? })
-        });
-        let possible = |place: &Self| (1..=place.of).contains(&place.number) && place.frames.end <= place.all;
-        let place = place.filter(possible);
-        let place = place.ok_or_else(|| Error::path(file.path(), "is no shard of an archive"))?;
-        let frames = file.frames() as u64;
-        match place.frames.end.checked_sub(place.frames.start) == Some(frames) {
-            true => Ok(place),
-            false => Err(Error::input(file.path(), format!("has {frames} frames, which are not those of its shard"))),
-        }
-    }
 }
 
 /// What of a shard stays in memory: the file is opened again when its turn comes.
@@ -295,51 +262,6 @@ impl Opened {
     }
 }
 
-/// Where a file stands in its archive.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Standing {
-    /// The same for all shards of an archive, and for the merged file.
-    pub archive: String,
-    /// The frames of the archive that the file holds.
-    pub frames: Range<usize>,
-    /// Frames of the archive.
-    pub all: usize,
-}
-
-impl Standing {
-    /// Of a shard, or of a file that is a whole archive.
-    ///
-    /// # Errors
-    /// A shard that contradicts itself.
-    pub fn of(file: &CoefficientFile) -> Result<Self> {
-        let metadata = file.metadata();
-        let id = without_shard(metadata).file_id(0, file.reader.features()).map_err(|e| file.failed(e))?;
-        let (frames, all) = match super::setting(metadata, SHARD) {
-            Some(_) => {
-                let Place { frames, all, .. } = Place::of(file)?;
-                (frames.start as usize..frames.end as usize, all as usize)
-            }
-            None => (0..file.frames(), file.frames()),
-        };
-        if frames.end > all {
-            return Err(Error::input(file.path(), format!("ends at frame {} of {all}", frames.end)));
-        }
-        Ok(Self { archive: id.to_string(), frames, all })
-    }
-
-    /// Whether the file is a shard of a longer archive.
-    pub fn is_part(&self) -> bool {
-        self.frames != (0..self.all)
-    }
-}
-
-/// The metadata that shards share: what one conversion would begin with.
-fn without_shard(of: &Metadata) -> Metadata {
-    let mut start = of.start();
-    start.settings.retain(|(name, _)| name != SHARD && name != SHARD_OF);
-    start
-}
-
 /// What differs between two shards, in a few words.
 fn difference(first: &Metadata, other: &Metadata) -> Option<String> {
     let setting = |(a, b): (&(String, String), &(String, String))| (a != b).then(|| a.0.clone());
@@ -386,11 +308,6 @@ fn check_order(shards: &[Opened], may_lack: bool) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-/// The frames of a shard, and how many its archive has; none of other files.
-pub fn frames_of_shard(file: &CoefficientFile) -> Option<(Range<u64>, u64)> {
-    Place::of(file).ok().map(|place| (place.frames, place.all))
 }
 
 /// A merged file that is being written.

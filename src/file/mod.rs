@@ -6,8 +6,10 @@
 mod counted;
 mod detail;
 pub mod promise;
-mod coefficient_file;
 mod fetch;
+mod coefficient_file;
+mod check;
+pub mod shard;
 pub mod report;
 pub mod verify;
 pub mod recover;

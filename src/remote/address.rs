@@ -1,6 +1,7 @@
 //! Addresses of objects, and the requests that they stand for.
 
 use super::profile::Profile;
+use crate::base::text::percent_decoded;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use rusty_s3::{Bucket, Credentials, S3Action, UrlStyle};
@@ -90,20 +91,7 @@ fn http(text: &str) -> Result<Address, String> {
         return Ok(Address::Http { url: text, authorization: None });
     };
     let url = text.replacen(authority.as_str(), host, 1);
-    Ok(Address::Http { url, authorization: Some(format!("Basic {}", STANDARD.encode(plain(who)))) })
-}
-
-/// Letters that were written as % and two hexadecimal digits.
-fn plain(text: &str) -> Vec<u8> {
-    let mut parts = text.split('%');
-    let mut bytes = parts.next().unwrap_or_default().as_bytes().to_vec();
-    for part in parts {
-        match part.get(..2).and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
-            Some(byte) => bytes.extend([&[byte], &part.as_bytes()[2..]].concat()),
-            None => bytes.extend([b"%", part.as_bytes()].concat()),
-        }
-    }
-    bytes
+    Ok(Address::Http { url, authorization: Some(format!("Basic {}", STANDARD.encode(percent_decoded(who)))) })
 }
 
 impl S3 {
@@ -155,11 +143,6 @@ mod tests {
         );
         assert!(address.is_encrypted() && !http("http://host/a b").expect("an address").is_encrypted());
         assert!(http("https:///run").is_err() && http("https://a\u{7}b/").is_err());
-    }
-
-    #[test]
-    fn letters_in_hexadecimal_become_plain() {
-        assert_eq!(plain("a%2Fb%%zz%4"), b"a/b%%zz%4");
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub(super) enum Failure {
     /// The server refuses, and may say why.
     Refused(io::Error),
     /// It may succeed later, perhaps after the time that the server names.
-    Passing(io::Error, Option<Duration>),
+    Temporary(io::Error, Option<Duration>),
 }
 
 impl Failure {
@@ -84,7 +84,7 @@ pub(super) fn check(
         206 => {}
         404 | 410 | 412 | 416 if known.is_some() => {
             return Err(changed(if status < 412 {
-                "the server has it no more"
+                "the server no longer has it"
             } else {
                 "the server has another version"
             }));
@@ -134,7 +134,7 @@ fn refusal(status: u16, headers: &HeaderMap) -> Failure {
         408 | 425 | 429 | 500 | 502 | 503 | 504 => {
             let wait = headers.get(RETRY_AFTER).and_then(|wait| wait.to_str().ok()?.trim().parse().ok());
             let what = format!("the server cannot answer now ({status})");
-            return Failure::Passing(io::Error::other(what), wait.map(Duration::from_secs));
+            return Failure::Temporary(io::Error::other(what), wait.map(Duration::from_secs));
         }
         _ => &format!("the server does not send it ({status})"),
     };
@@ -163,7 +163,7 @@ mod tests {
 
     fn error(failure: Result<About, Failure>) -> io::Error {
         match failure.expect_err("it is refused") {
-            Failure::Final(error) | Failure::Refused(error) | Failure::Passing(error, _) => error,
+            Failure::Final(error) | Failure::Refused(error) | Failure::Temporary(error, _) => error,
         }
     }
 
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn busy_servers_are_asked_again() {
         let busy = |wait| check((503, &headers(&[("Retry-After", wait)])), &(0..9), None);
-        assert!(matches!(busy("7"), Err(Failure::Passing(_, Some(wait))) if wait.as_secs() == 7));
-        assert!(matches!(busy("Fri, 31 Dec 1999 23:59:59 GMT"), Err(Failure::Passing(_, None))));
+        assert!(matches!(busy("7"), Err(Failure::Temporary(_, Some(wait))) if wait.as_secs() == 7));
+        assert!(matches!(busy("Fri, 31 Dec 1999 23:59:59 GMT"), Err(Failure::Temporary(_, None))));
     }
 }

@@ -133,7 +133,7 @@ impl CachedObject {
         let is_whole = bytes.len() == length && checksum == self.checksum(page, &bytes);
         let unused = about.modified().ok().and_then(|used| used.elapsed().ok());
         if is_whole && unused.is_some_and(|unused| unused > RECENT) {
-            let _ = file.set_times(FileTimes::new().set_modified(SystemTime::now())); // it is removed sooner
+            let _ = file.set_times(FileTimes::new().set_modified(SystemTime::now())); // if that fails, it is removed sooner
         }
         is_whole.then_some(bytes)
     }

@@ -184,7 +184,7 @@ fn patiently<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
         match request() {
             Ok(answer) => return Ok(answer),
             Err(Failure::Final(error) | Failure::Refused(error)) => return Err(error),
-            Err(Failure::Passing(_, asked)) => {
+            Err(Failure::Temporary(_, asked)) => {
                 thread::sleep(asked.map_or(wait, |asked| asked.min(LONGEST_WAIT)).mul_f64(spread()));
             }
         }
@@ -192,7 +192,7 @@ fn patiently<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
     }
     request().map_err(|failure| match failure {
         Failure::Final(error) | Failure::Refused(error) => error,
-        Failure::Passing(error, _) => io::Error::new(error.kind(), format!("{error}; it was asked {TRIES} times")),
+        Failure::Temporary(error, _) => io::Error::new(error.kind(), format!("{error}; it was asked {TRIES} times")),
     })
 }
 
@@ -223,7 +223,7 @@ fn agent(address: &Address, timeout: Duration) -> Agent {
 fn body_of(body: Body, length: u64) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::with_capacity(length as usize);
     let read = body.into_reader().take(length + 1).read_to_end(&mut bytes);
-    let cut = |what: String| Failure::Passing(io::Error::new(io::ErrorKind::UnexpectedEof, what), None);
+    let cut = |what: String| Failure::Temporary(io::Error::new(io::ErrorKind::UnexpectedEof, what), None);
     match (read, bytes.len() as u64) {
         (Err(error), _) => Err(failure(error.into())),
         (Ok(_), found) if found == length => Ok(bytes),
@@ -238,7 +238,7 @@ fn body_of(body: Body, length: u64) -> Result<Vec<u8>, Failure> {
 fn failure(error: ureq::Error) -> Failure {
     match error {
         ureq::Error::Timeout(_) => {
-            Failure::Passing(io::Error::new(io::ErrorKind::TimedOut, "the server does not answer in time"), None)
+            Failure::Temporary(io::Error::new(io::ErrorKind::TimedOut, "the server does not answer in time"), None)
         }
         ureq::Error::HostNotFound => Failure::last("there is no host of this name, or no network"),
         ureq::Error::TooManyRedirects | ureq::Error::RedirectFailed => {
@@ -252,8 +252,8 @@ fn failure(error: ureq::Error) -> Failure {
         ureq::Error::Io(error) if error.kind() == io::ErrorKind::InvalidData => {
             Failure::last(format!("no encrypted connection: {error}"))
         }
-        ureq::Error::Io(error) => Failure::Passing(error, None),
-        ureq::Error::ConnectionFailed => Failure::Passing(io::Error::other("no connection to the server"), None),
+        ureq::Error::Io(error) => Failure::Temporary(error, None),
+        ureq::Error::ConnectionFailed => Failure::Temporary(io::Error::other("no connection to the server"), None),
         other if other.to_string().contains("missing a location") => Failure::last(
             "the server says that it is elsewhere, but not where; AWS_REGION may not be that of the bucket",
         ),

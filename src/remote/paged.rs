@@ -236,17 +236,6 @@ impl<S: Storage> Storage for Paged<S> {
         Ok(())
     }
 
-    fn read_many(&self, ranges: &[Range<u64>]) -> io::Result<Vec<Vec<u8>>> {
-        ranges.iter().try_for_each(|range| self.check(range))?;
-        let pages = self.get(&ranges.iter().flat_map(numbers).collect())?;
-        let read = |range: &Range<u64>| {
-            let mut bytes = vec![0; (range.end - range.start) as usize];
-            copy(&pages, range, &mut bytes);
-            bytes
-        };
-        Ok(ranges.iter().map(read).collect())
-    }
-
     fn fetch(&self, ranges: &[Range<u64>]) -> io::Result<()> {
         let mut wanted = BTreeSet::new();
         let within = ranges.iter().map(|range| range.start..range.end.min(self.storage.len()));

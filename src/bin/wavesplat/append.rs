@@ -9,8 +9,9 @@ use wavesplat::base::output::{STANDARD, part_of};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use wavesplat::convert::{ConvertConfig, PartialFile, of_file};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::merge::{Shards, frames_of_shard};
+use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::{self, Earlier, begins_with, ends_with, open_successor};
+use wavesplat::file::shard::frames_of_shard;
 use wavesplat::source::FrameSource;
 
 /// Add later frames to a coefficient file
@@ -57,7 +58,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let path = linked.unwrap_or(args.file.clone()); // replaces the file, not the link to it
     refuse_output(&path)?;
     let file = CoefficientFile::open_with(&path, args.input.access())?;
-    if args.inputs.iter().map(|input| is_shard(input)).collect::<Result<Vec<_>>>()?.iter().all(|is_shard| *is_shard) {
+    if are_shards(&args.inputs)? {
         return args.append_shards(&file);
     }
     let config = args.config(&file)?;
@@ -88,10 +89,15 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
 }
 
-/// Whether an input is a shard, which is copied; other coefficient files are sources like any other.
-fn is_shard(input: &Path) -> Result<bool> {
-    let is_named = input.extension().is_some_and(|extension| extension == "wspl");
-    Ok(is_named && frames_of_shard(&CoefficientFile::open(input)?).is_some())
+/// Whether all inputs are shards, which are copied; other coefficient files are sources like any other.
+fn are_shards(inputs: &[PathBuf]) -> Result<bool> {
+    for input in inputs {
+        let is_named = input.extension().is_some_and(|extension| extension == "wspl");
+        if !is_named || frames_of_shard(&CoefficientFile::open(input)?).is_none() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 impl AppendArgs {

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
 use wavesplat::file::CoefficientFile;
-use wavesplat::file::merge::frames_of_shard;
 use wavesplat::file::report::{BoundReport, largest_bound};
+use wavesplat::file::shard::frames_of_shard;
 use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat::source::FrameSource;
 
@@ -108,9 +108,7 @@ impl VerifyArgs {
         let source = narrow(source, remembered(file, "frames")?, None)?;
         let shard =
             frames_of_shard(file).filter(|(_, all)| source.archive().frames.map(|frames| frames as u64) == Some(*all));
-        let of_shard = shard.map(|(frames, _)| format!("{}:{}", frames.start, frames.end));
-        let of_shard = of_shard.map(|range| range.parse().map_err(|what: String| Error::input(file.path(), what)));
-        narrow(source, of_shard.transpose()?, None).map(Some)
+        narrow(source, shard.map(|(frames, _)| frames.into()), None).map(Some)
     }
 }
 

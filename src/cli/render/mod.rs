@@ -8,6 +8,7 @@ mod chart;
 mod colouring;
 mod colours;
 mod config;
+mod conflicts;
 mod cuts;
 mod generate;
 #[cfg(feature = "view")]

@@ -3,6 +3,7 @@
 use super::along::ModeName;
 use super::args::{Cli, ErrorName, MethodName, QuantityName};
 use super::colouring::ColouredPictures;
+use super::conflicts;
 use super::ranges::Ranges;
 use super::report::{Reported, summary, unit};
 use super::scene::Opened;
@@ -12,7 +13,7 @@ use crate::base::grid::Region;
 use crate::base::output::Output;
 use crate::base::progress::Progress;
 use crate::cli::spare_inputs;
-use crate::file::merge::Standing;
+use crate::file::shard::Standing;
 use crate::file::{CoefficientFile, setting};
 use crate::render::annotate::AxisLabels;
 use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
@@ -21,67 +22,16 @@ use crate::render::{Quantity, RenderConfig, RenderReport, Scene, Sums, render_su
 use clap::Args;
 use serde::Serialize;
 
-/// Options of pictures that their parts do not have: what is done with sums.
-const OF_SUMS: [&str; 15] = [
-    "error_image",
-    "colormap",
-    "range",
-    "norm",
-    "clear",
-    "background",
-    "bar_title",
-    "theme",
-    "format",
-    "depth",
-    "fps",
-    "speed",
-    "sidecar",
-    "points",
-    "regions",
-];
-
-/// Options that parts have, and their sum takes from them.
-const OF_PARTS: [&str; 28] = [
-    "views",
-    "orbit",
-    "over_time",
-    "key_frames",
-    "roll",
-    "size",
-    "scale",
-    "center",
-    "exaggerate",
-    "region",
-    "tau",
-    "sigma",
-    "splat_error",
-    "lod",
-    "fast",
-    "tolerance",
-    "error",
-    "error_image",
-    "quantity",
-    "mode",
-    "transfer_function",
-    "iso",
-    "planes",
-    "method",
-    "missing_value",
-    "skip_damaged",
-    "points",
-    "regions",
-];
-
 /// Options for pictures in parts.
 #[derive(Debug, Args)]
 pub(crate) struct PartArgs {
     /// Write what the voxels of --region, or the frames of a shard, add to the pictures instead of pictures: a file for --sum.
     /// The volume is framed and splatted as a whole. Projections only
-    #[arg(long, conflicts_with_all = OF_SUMS, help_heading = "Parts")]
+    #[arg(long, conflicts_with_all = conflicts::of_sums(), help_heading = "Parts")]
     pub(crate) partial: bool,
     /// Add files of --partial and make pictures of the sums; with --partial, make one file of them. --annotate and --title
     /// must be given to the parts too, since they move the volume aside
-    #[arg(long, conflicts_with_all = OF_PARTS, help_heading = "Parts")]
+    #[arg(long, conflicts_with_all = conflicts::of_parts(), help_heading = "Parts")]
     pub(crate) sum: bool,
 }
 
@@ -373,11 +323,10 @@ fn whole_voxels(total: &Total) -> Region {
 /// Adds what the parts say of themselves.
 fn of_parts(provenance: Provenance, total: &Total) -> Provenance {
     let (look, sources) = (total.look(), total.sources());
-    let Region { start, end } = total.bounds();
     Provenance {
         lod: Some(look.lod).filter(|lod| *lod > 0),
         exaggerate: Some(look.exaggeration).filter(|factor| *factor != 1.0),
-        region: (!total.is_whole()).then(|| [0, 1, 2].map(|a| format!("{}:{}", start[a], end[a])).join(",")),
+        region: (!total.is_whole()).then(|| total.bounds().to_string()),
         sample_error: Some(total.sample_error()),
         file_id: (sources.len() == 1).then(|| sources[0].file.clone()),
         ..provenance

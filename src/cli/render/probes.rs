@@ -2,6 +2,7 @@
 
 use super::args::Cli;
 use super::chart::{Band, Chart, Line};
+use super::conflicts::of_pictures;
 use super::places::{Axes, Place, text};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
@@ -19,46 +20,6 @@ use std::io::Write as _;
 use std::path::Path;
 use std::str::FromStr;
 
-/// Options of pictures, which time series do not have.
-const OF_PICTURES: [&str; 36] = [
-    "planes",
-    "slices",
-    "views",
-    "orbit",
-    "over_time",
-    "key_frames",
-    "speed",
-    "roll",
-    "size",
-    "scale",
-    "center",
-    "exaggerate",
-    "region",
-    "tau",
-    "sigma",
-    "splat_error",
-    "lod",
-    "fast",
-    "tolerance",
-    "error",
-    "error_image",
-    "quantity",
-    "mode",
-    "transfer_function",
-    "colormap",
-    "range",
-    "norm",
-    "annotate",
-    "background",
-    "method",
-    "format",
-    "depth",
-    "fps",
-    "sidecar",
-    "partial",
-    "sum",
-];
-
 /// Options for time series.
 #[derive(Debug, Args)]
 pub(crate) struct ProbeArgs {
@@ -69,13 +30,13 @@ pub(crate) struct ProbeArgs {
         long = "probe",
         value_name = "X,Y,Z",
         allow_hyphen_values = true,
-        conflicts_with_all = OF_PICTURES,
+        conflicts_with_all = of_pictures(),
         help_heading = "Time series"
     )]
     points: Vec<PointSpec>,
     /// Write the mean, the least and the largest value of voxels x0:x1,y0:y1,z0:z1 over time instead of pictures; repeat
     /// it for more regions
-    #[arg(long = "probe-region", value_name = "BOX", conflicts_with_all = OF_PICTURES, help_heading = "Time series")]
+    #[arg(long = "probe-region", value_name = "BOX", conflicts_with_all = of_pictures(), help_heading = "Time series")]
     regions: Vec<RegionSpec>,
 }
 

@@ -31,7 +31,7 @@ impl Cli {
                 ErrorName::Certified => "certified",
                 ErrorName::Expected => "expected",
             }),
-            region: config.region.map(|r| [0, 1, 2].map(|a| format!("{}:{}", r.start[a], r.end[a])).join(",")),
+            region: config.region.map(|region| region.to_string()),
             missing_value: self.missing_value,
             frames: config.frames.clone(),
             times: config.frames.iter().filter_map(|frame| times.times().get(*frame)).copied().collect(),

@@ -84,14 +84,17 @@ impl Total {
 
     /// The share of the lattice whose voxels the parts have, 0 to 1.
     pub fn covered(&self) -> f64 {
-        let voxels = |of: &Region| of.dims().into_iter().map(|n| n as f64).product::<f64>();
-        self.boxes.iter().map(voxels).sum::<f64>() / voxels(&self.look().grid.whole())
+        self.voxels() as f64 / self.look().grid.whole().voxels() as f64
     }
 
     /// Whether the parts have all voxels of the lattice.
     pub fn is_whole(&self) -> bool {
-        let voxels = |of: &Region| of.dims().into_iter().map(|n| n as u128).product::<u128>();
-        self.boxes.iter().map(voxels).sum::<u128>() == voxels(&self.look().grid.whole())
+        self.voxels() == self.look().grid.whole().voxels()
+    }
+
+    /// The voxels of all boxes, which share none.
+    fn voxels(&self) -> usize {
+        self.boxes.iter().map(Region::voxels).sum()
     }
 
     /// The smallest box that holds all voxels of the parts.
@@ -295,10 +298,9 @@ impl Total {
         let lacking = self.boxes.iter().find(|of| !own.contains(of));
         let other = self.pictures.values().next().map(name).unwrap_or_default();
         let what = match lacking {
-            Some(of) => format!(
-                "frame {frame} lacks the voxels {} that frame {first} has in {other}; a part is missing",
-                text(of)
-            ),
+            Some(of) => {
+                format!("frame {frame} lacks the voxels {of} that frame {first} has in {other}; a part is missing")
+            }
             None => format!("frame {frame} has voxels that frame {first} lacks in {other}; a part is missing"),
         };
         Error::path(self.parts[holders[0].0].path(), what)
@@ -396,8 +398,8 @@ fn check_apart(parts: &[PartFile], holders: &Holders) -> Result<()> {
         if let Some((b, other)) = near.into_iter().find(|(b, _)| !a.intersect(b).is_empty()) {
             let (part, before) = (&parts[*other.max(first)], parts[*other.min(first)].path().display());
             let what = match a == b {
-                true => format!("has the same voxels and frames as {before}: {}", text(a)),
-                false => format!("shares voxels with {before}: {}", text(&a.intersect(b))),
+                true => format!("has the same voxels and frames as {before}: {a}"),
+                false => format!("shares voxels with {before}: {}", a.intersect(b)),
             };
             return Err(Error::path(part.path(), what));
         }
@@ -412,9 +414,4 @@ fn order(of: &Region) -> [usize; 6] {
 
 fn first_voxel(boxes: &[Region]) -> Option<[usize; 6]> {
     boxes.iter().map(order).min()
-}
-
-/// A box of voxels in the form of options.
-fn text(of: &Region) -> String {
-    [0, 1, 2].map(|axis| format!("{}:{}", of.start[axis], of.end[axis])).join(",")
 }

@@ -60,7 +60,7 @@ impl CoefficientScene {
         let mut gathered = Gathered::default();
         for frames in windows {
             let batch = CoefficientBatch::open(file, self.what, &BatchRequest { frames, ..*request })?;
-            gathered.add(batch.parts()?);
+            batch.gather(&batch.selection.blocks, &mut gathered)?;
             self.fetched[channel] = frames[frames.len() - 1] + 1;
             if gathered.is_full() {
                 break;
@@ -298,14 +298,16 @@ impl<'a> CoefficientBatch<'a> {
         Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
     }
 
-    /// The parts of all selected blocks.
-    fn parts(&self) -> Result<Vec<PartEntry>> {
+    /// Gathers what is read of some blocks, the first ones first, until there is as much as is fetched at a time.
+    fn gather(&self, blocks: &[usize], gathered: &mut Gathered) -> Result<()> {
         let BatchPlan { codec, wanted, .. } = &self.plan;
-        let mut parts = Vec::new();
-        for block in &self.selection.blocks {
-            parts.extend(Block::parts(codec, &self.kept(*block)?.entry, wanted));
+        for block in blocks {
+            if gathered.is_full() {
+                break;
+            }
+            gathered.add(Block::parts(codec, &self.kept(*block)?.entry, wanted).copied());
         }
-        Ok(parts)
+        Ok(())
     }
 
     /// Reads a block, and returns it with the errors of its samples.
@@ -328,14 +330,8 @@ impl FrameBatch for CoefficientBatch<'_> {
         if !self.file.is_remote() {
             return Ok(());
         }
-        let BatchPlan { codec, wanted, .. } = &self.plan;
         let mut gathered = Gathered::default();
-        for block in blocks {
-            gathered.add(Block::parts(codec, &self.kept(*block)?.entry, wanted).copied());
-            if gathered.is_full() {
-                break;
-            }
-        }
+        self.gather(blocks, &mut gathered)?;
         self.file.fetch_gathered(&gathered)
     }
 

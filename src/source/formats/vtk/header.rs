@@ -5,6 +5,7 @@ use crate::base::error::{Error, Result};
 use crate::base::mapped::{Access, FileBytes};
 use crate::base::sample::{self, SampleType};
 use crate::base::stored::StoredType;
+use crate::base::text::percent_decoded;
 use crate::source::Parsed;
 use crate::source::formats::shared::association::Association;
 use crate::source::formats::shared::pieces::Packed;
@@ -275,13 +276,5 @@ fn is_time(name: &str) -> bool {
 
 /// A name in which VTK has written some characters as `%20`.
 fn decoded(name: &str) -> String {
-    let mut bytes = Vec::new();
-    let mut rest = name.as_bytes();
-    while let [first, after @ ..] = rest {
-        let code = after.get(..2).and_then(|hex| std::str::from_utf8(hex).ok());
-        let byte = code.and_then(|hex| u8::from_str_radix(hex, 16).ok()).filter(|_| *first == b'%');
-        bytes.push(byte.unwrap_or(*first));
-        rest = if byte.is_some() { &after[2..] } else { after };
-    }
-    String::from_utf8_lossy(&bytes).into_owned()
+    String::from_utf8_lossy(&percent_decoded(name)).into_owned()
 }

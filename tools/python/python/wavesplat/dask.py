@@ -19,8 +19,8 @@ import xarray as xr
 
 from ._convert import convert as _convert
 from ._convert import merge
+from ._file import anywhere, pictures, run
 from ._file import open as _open
-from ._file import pictures, run
 
 CHAIN = 256
 """Frames of a chain by default: 8 windows of 32 frames."""
@@ -156,7 +156,7 @@ def render(
 
     client = client or distributed.get_client()
     paths = [source] if isinstance(source, (str, PathLike)) else list(source)
-    files = [os.path.abspath(path) for path in paths]
+    files = [anywhere(os.fspath(path)) for path in paths]
     if not files:
         raise ValueError("source: takes a file, or several")
     if regions is None and len(files) == 1:

@@ -1,0 +1,90 @@
+//! The place of a file in its archive: of a shard as its settings say it, of any other the whole.
+
+use super::CoefficientFile;
+use crate::base::error::{Error, Result};
+use std::ops::Range;
+use wavesplat_format::Metadata;
+
+/// The settings of a shard: which of how many it is, and its frames of how many.
+pub(crate) const SHARD: &str = "shard";
+pub(crate) const SHARD_OF: &str = "shard-of";
+
+/// The place of a shard, as its settings say it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) number: usize,
+    pub(super) of: usize,
+    pub(super) frames: Range<u64>,
+    pub(super) all: u64,
+}
+
+impl Place {
+    pub(super) fn of(file: &CoefficientFile) -> Result<Self> {
+        let named = |name| super::setting(file.metadata(), name);
+        let place = named(SHARD).zip(named(SHARD_OF)).and_then(|(shard, frames)| {
+            let (number, of) = shard.split_once('/')?;
+            let (frames, all) = frames.split_once('/')?;
+            let (start, end) = frames.split_once(':')?;
+            let frames = start.parse().ok()?..end.parse().ok()?;
+            Some(Self { number: number.parse().ok()?, of: of.parse().ok()?, frames, all: all.parse().ok()? })
+        });
+        let possible = |place: &Self| (1..=place.of).contains(&place.number) && place.frames.end <= place.all;
+        let place = place.filter(possible);
+        let place = place.ok_or_else(|| Error::path(file.path(), "is no shard of an archive"))?;
+        let frames = file.frames() as u64;
+        match place.frames.end.checked_sub(place.frames.start) == Some(frames) {
+            true => Ok(place),
+            false => Err(Error::input(file.path(), format!("has {frames} frames, which are not those of its shard"))),
+        }
+    }
+}
+
+/// The frames of a shard, and how many its archive has; none of other files.
+pub fn frames_of_shard(file: &CoefficientFile) -> Option<(Range<u64>, u64)> {
+    Place::of(file).ok().map(|place| (place.frames, place.all))
+}
+
+/// Where a file stands in its archive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Standing {
+    /// The same for all shards of an archive, and for the merged file.
+    pub archive: String,
+    /// The frames of the archive that the file holds.
+    pub frames: Range<usize>,
+    /// Frames of the archive.
+    pub all: usize,
+}
+
+impl Standing {
+    /// Of a shard, or of a file that is a whole archive.
+    ///
+    /// # Errors
+    /// A shard that contradicts itself.
+    pub fn of(file: &CoefficientFile) -> Result<Self> {
+        let metadata = file.metadata();
+        let id = without_shard(metadata).file_id(0, file.reader.features()).map_err(|e| file.failed(e))?;
+        let (frames, all) = match super::setting(metadata, SHARD) {
+            Some(_) => {
+                let Place { frames, all, .. } = Place::of(file)?;
+                (frames.start as usize..frames.end as usize, all as usize)
+            }
+            None => (0..file.frames(), file.frames()),
+        };
+        if frames.end > all {
+            return Err(Error::input(file.path(), format!("ends at frame {} of {all}", frames.end)));
+        }
+        Ok(Self { archive: id.to_string(), frames, all })
+    }
+
+    /// Whether the file is a shard of a longer archive.
+    pub fn is_part(&self) -> bool {
+        self.frames != (0..self.all)
+    }
+}
+
+/// The metadata that shards share: what one conversion would begin with.
+pub(super) fn without_shard(of: &Metadata) -> Metadata {
+    let mut start = of.start();
+    start.settings.retain(|(name, _)| name != SHARD && name != SHARD_OF);
+    start
+}
