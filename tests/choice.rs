@@ -16,11 +16,19 @@ use wavesplat_format::{BlockId, EncodedPart};
 const EDGE: usize = 24;
 const FRAMES: usize = 16;
 
-/// Waves that are long along one axis of x, y, z, t and short along the others.
+/// Stands for an axis: waves are long in space, and their phases jump from frame to frame.
+const SPACE_ALONE: usize = 4;
+
+/// Waves that are long along one axis of x, y, z, t and short along the others; or [`SPACE_ALONE`].
 fn long_along(axis: usize) -> Vec<f64> {
+    let length = |a: usize| match axis {
+        SPACE_ALONE => [0.1, 0.1, 0.1, 100.0][a],
+        _ if a == axis => 0.05,
+        _ => 0.5,
+    };
     let mut random = Random(axis as u64);
     let wave = |random: &mut Random| {
-        let along: [f64; 4] = std::array::from_fn(|a| random.signed() * if a == axis { 0.05 } else { 0.5 });
+        let along: [f64; 4] = std::array::from_fn(|a| random.signed() * length(a));
         (along, 6.0 * random.unit(), random.signed())
     };
     let waves: Vec<_> = (0..6).map(|_| wave(&mut random)).collect();
@@ -41,12 +49,12 @@ fn size<'a>(parts: impl IntoIterator<Item = &'a EncodedPart>) -> usize {
 
 fn schemes(like: &Pyramid) -> Vec<Scheme> {
     use Axis::{T, X, Y, Z};
-    let scheme = |order: [Axis; 4], stencil, growth, most| {
+    let scheme = |order: &[Axis], stencil, growth, most| {
         let pyramid = Pyramid { order: order.to_vec(), stencil, growth, most, ..like.clone() };
         Scheme { pyramid: Some(pyramid), ..Scheme::along_time(Basis::Samples) }
     };
     let mut found = Vec::new();
-    for order in [[X, Y, Z, T], [Z, Y, X, T], [T, Z, Y, X]] {
+    for order in [&[X, Y, Z, T][..], &[Z, Y, X, T], &[T, Z, Y, X], &[Z, Y, X]] {
         for stencil in [Stencil::Linear, Stencil::Cubic] {
             found.extend([(1.0, 1.0), (1.5, 3.0), (2.0, 4.0)].map(|(g, m)| scheme(order, stencil, g, m)));
         }
@@ -56,7 +64,7 @@ fn schemes(like: &Pyramid) -> Vec<Scheme> {
 
 #[test]
 fn the_chosen_scheme_is_nearly_the_smallest() {
-    for axis in 0..4 {
+    for axis in 0..=SPACE_ALONE {
         for tolerance in [1e-2, 1e-3] {
             let samples = bytes(SampleType::F32, &long_along(axis));
             let grid = Grid::unit([EDGE; 3]);

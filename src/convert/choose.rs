@@ -1,8 +1,8 @@
 //! Chooses the scheme of a window: the one that makes some of its boxes smallest.
 //!
-//! Candidates are a learned basis along time (eq 20) with a pyramid in space, and pyramids in space and time (eq 32) whose
-//! passes along time come first or last. The first suits slow change and noise, the others fronts and moving things. Axes
-//! come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
+//! Candidates are a learned basis along time (eq 20) with a pyramid in space, pyramids in space and time (eq 32) whose passes
+//! along time come first or last, and pyramids in space alone, frame by frame. The first suits slow change and noise, the
+//! others fronts and moving things, the last those that move by more than their size from frame to frame. Axes come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
 //! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33), the growth of steps (eq 34) and ghost
 //! nodes.
 
@@ -274,7 +274,9 @@ impl SchemeSelector<'_> {
             found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
         if basis.is_none_or(|b| b == Basis::Samples) {
-            for order in [[&[Axis::T], &in_space[..]].concat(), [&in_space[..], &[Axis::T]].concat()] {
+            let time_first = [&[Axis::T], &in_space[..]].concat();
+            let time_last = [&in_space[..], &[Axis::T]].concat();
+            for order in [time_first, time_last, in_space] {
                 let (coarseness, pyramid) = (self.coarseness(1.0), Some(self.pyramid(&order, stencil)));
                 found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
             }
@@ -285,6 +287,7 @@ impl SchemeSelector<'_> {
                 scheme.coarseness = before.coarseness;
             };
             found.iter_mut().filter(|scheme| scheme.basis == before.basis).for_each(begin);
+            found.dedup();
         }
         Ok(found)
     }
