@@ -8,6 +8,7 @@ mod distribution;
 mod file;
 mod lab;
 mod list;
+mod lookup;
 mod named;
 mod paraview;
 mod scale;

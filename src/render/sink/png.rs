@@ -86,6 +86,7 @@ fn encoder<W: Write>(
     let (colours, depth) = Samples::of(config).kind();
     encoder.set_color(colours);
     encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::Fast); // a sixteenth of the default's time, for 15 to 50 % more bytes
     texts.iter().try_for_each(|(key, text)| add_text(&mut encoder, key.clone(), text.clone()))?;
     Ok(encoder)
 }
