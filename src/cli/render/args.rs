@@ -95,8 +95,8 @@ pub struct Cli {
     pub(crate) sigma: Option<f64>,
     /// Error that splatting may add; more is faster. For means it is a share of the value range, at pixels with the
     /// view's largest weights (elsewhere in inverse proportion to the weights); for emissions, a share of the brightest
-    /// pixel that the largest sample could give. 0 uses the exact method [default: half of --tolerance or the file's
-    /// tolerance, at most 1e-3]
+    /// pixel that the largest sample could give. 0 uses the exact method [default: --tolerance or the file's tolerance,
+    /// at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     pub(crate) splat_error: Option<f64>,
     /// Level of detail: read and splat only every 2^N-th voxel along each axis, with a wider kernel. auto takes as much as
