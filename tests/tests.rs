@@ -13,6 +13,7 @@ mod cli;
 mod coefficients;
 mod common;
 mod composite;
+mod decoded_once;
 mod detail;
 mod determinism;
 mod every_float;

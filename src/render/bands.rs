@@ -1,4 +1,5 @@
-//! Splats a batch into the pictures of some views, as many rows at a time as fit in memory.
+//! Splats a batch into the pictures of some views, as many rows at a time as fit in memory. A band that needs more sums in
+//! f64 than have room is splatted again, with fewer rows.
 
 use super::plan::Budget;
 use super::report::{RenderReport, lap};
@@ -23,12 +24,19 @@ pub(super) fn splat_bands<T: Send, P: DerefMut<Target = [T]>>(
 ) -> Result<()> {
     let layout = batch.layout();
     let blocks = visible_blocks(batch, weighted, report);
-    for rows in budget.bands(&layout) {
+    let (mut start, end) = (0, weighted[0].setup.camera.size[1]);
+    while start < end {
+        let plan = budget.band(&layout, start);
         let mut bands: Vec<_> = weighted
             .iter()
-            .map(|view| BandAccumulator::new(view.setup, rows.clone(), &layout).relative_to(view.weights.ones()))
+            .map(|view| BandAccumulator::new(view.setup, plan.rows.clone(), &layout).relative_to(view.weights.ones()))
             .collect();
-        report.add_splatted(&splat(&mut bands, (&blocks, budget.batch(&layout, rows.len())), &batch)?);
+        report.add_splatted(&splat(&mut bands, (&blocks, plan.blocks), &batch, &plan.room)?);
+        report.planned_bytes = report.planned_bytes.max(budget.note(&layout, &plan) as u64);
+        if plan.room.is_exceeded() {
+            continue; // with more room, in a lower band
+        }
+        start = plan.rows.end;
         let mut clock = Instant::now();
         for (view, (band, pictures)) in bands.into_iter().zip(&mut *pictures).enumerate() {
             band.finish(pictures, |tile, rows| finish(view, tile, rows));

@@ -6,20 +6,23 @@
 use super::config::RenderConfig;
 use super::layout::Layout;
 use super::scene::Scene;
-use super::splat::ViewSetup;
 use super::splat::footprints::Splats;
 use super::splat::sparse_terms::SparseTerms;
 use super::splat::tile_rect::TILE;
+use super::splat::{DoubleRoom, ViewSetup};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::memory;
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// The memory of views that are rendered together.
 #[derive(Debug)]
 pub(super) struct Budget<'a> {
     setups: &'a [ViewSetup],
-    /// Bytes left for pictures, planes and blocks, after the weights.
+    /// Bytes that do not depend on how the work is divided.
+    fixed: usize,
+    /// Bytes left for pictures, planes and blocks.
     available: usize,
     size: [usize; 2],
     /// Bytes of a pixel and frame in the finished pictures of all views.
@@ -29,6 +32,23 @@ pub(super) struct Budget<'a> {
     /// The largest block.
     block: Region,
     block_bytes: usize,
+    /// The largest number of planes of a band that needed sums in f64 so far.
+    doubles: AtomicUsize,
+}
+
+/// Planes of a band: all of them, and those of all views that have sums in f64 as well.
+#[derive(Debug, Clone, Copy)]
+struct Planes {
+    all: usize,
+    doubles: usize,
+}
+
+/// A band of rows to splat, the blocks to decode at a time, and the room for sums in f64.
+#[derive(Debug)]
+pub(super) struct BandPlan {
+    pub(super) rows: Range<usize>,
+    pub(super) blocks: usize,
+    pub(super) room: DoubleRoom,
 }
 
 /// What is kept of every pixel until the sink takes it.
@@ -60,7 +80,8 @@ impl<'a> Budget<'a> {
         let planes = scene.most_planes(1, config);
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
-            fixed(config, setups) + Budget::new((config, kept), scene, setups).bytes(1, planes, TILE)
+            let budget = Budget::new((config, kept), scene, setups);
+            budget.fixed + budget.bytes(1, budget.all_double(planes), TILE)
         };
         setups.iter().map(least).max().unwrap_or(0)
     }
@@ -83,9 +104,11 @@ impl<'a> Budget<'a> {
     fn new((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let [of_a_view, together] = kept.bytes(scene.channels(), config);
         let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view);
-        let available = config.memory.saturating_sub(fixed(config, setups));
+        let fixed = fixed(config, setups);
+        let available = config.memory.saturating_sub(fixed);
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
-        Self { setups, available, size, pixel_bytes, together, block, block_bytes }
+        let doubles = AtomicUsize::new(0);
+        Self { setups, fixed, available, size, pixel_bytes, together, block, block_bytes, doubles }
     }
 
     /// The budget for as many of the first views as fit together: whole pictures of all views, and as many frames at a
@@ -105,7 +128,7 @@ impl<'a> Budget<'a> {
         let alone = Self::new((config, kept), scene, &setups[..1]);
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = scene.most_planes(frames, config);
-        let fits = |budget: &Self| budget.bytes(frames, planes, rows) <= budget.available;
+        let fits = |budget: &Self| budget.fits(frames, budget.planes(planes), rows);
         let several = |count: usize| Some(Self::new((config, kept), scene, &setups[..count])).filter(fits);
         let (mut best, mut least, mut most) = (alone, 1, setups.len());
         while least < most {
@@ -128,9 +151,24 @@ impl<'a> Budget<'a> {
         self.size[0] * self.size[1]
     }
 
+    /// The planes of a band, with as many in f64 as have been seen.
+    fn planes(&self, all: usize) -> Planes {
+        Planes { all, doubles: self.doubles.load(Relaxed).min(all * self.setups.len()) }
+    }
+
+    /// The planes of a band if all have sums in f64.
+    fn all_double(&self, all: usize) -> Planes {
+        Planes { all, doubles: all * self.setups.len() }
+    }
+
     /// Bytes of the pictures of `frames` frames, bands of `rows` rows, and one block.
-    fn bytes(&self, frames: usize, planes: usize, rows: usize) -> usize {
-        self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes)
+    fn bytes(&self, frames: usize, planes: Planes, rows: usize) -> usize {
+        self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes.all)
+    }
+
+    /// Whether [`Self::bytes`] fit; and also the lowest band, should all planes need sums in f64.
+    fn fits(&self, frames: usize, planes: Planes, rows: usize) -> bool {
+        self.bytes(frames, planes, rows).max(self.bytes(frames, self.all_double(planes.all), TILE)) <= self.available
     }
 
     /// Bytes of a block, with its sparse terms and their projections in each view that takes footprints, and its cells of
@@ -147,35 +185,69 @@ impl<'a> Budget<'a> {
         (frames * self.pixel_bytes + self.together) * self.pixels()
     }
 
-    /// Bytes of bands of `rows` rows with all planes, and of the scratch of all threads.
-    fn band_bytes(&self, planes: usize, rows: usize) -> usize {
-        let band = |planes: usize| move |setup: &ViewSetup| setup.backend.band_sums(self.size[0], rows, planes);
-        let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes)).max().unwrap_or(0);
-        let (bands, threads) = (self.setups.iter().map(band(planes)).sum::<usize>(), rayon::current_num_threads());
-        // A thread filters one plane of a lattice in f64, out of place.
-        let filtered = self.setups.iter().map(band(1)).max().unwrap_or(0);
-        let numbers = bands + threads * (scratch + filtered);
-        numbers * size_of::<f64>()
+    /// Bytes of bands of `rows` rows, and of the scratch of all threads.
+    fn band_bytes(&self, planes: Planes, rows: usize) -> usize {
+        let of_views = |bytes: &dyn Fn(&ViewSetup) -> usize| self.setups.iter().map(bytes).sum::<usize>();
+        let bands = of_views(&|setup| setup.backend.band_bytes(self.size[0], rows, planes.all));
+        let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes.all)).max().unwrap_or(0);
+        let threads = rayon::current_num_threads();
+        // A thread filters one plane in f64, out of place.
+        let filtered = if planes.doubles > 0 { threads } else { 0 };
+        bands + (planes.doubles + filtered) * self.double_bytes(rows) + threads * scratch * size_of::<f64>()
+    }
+
+    /// Bytes of a plane in f64 of a band of `rows` rows, in the view where it takes most.
+    fn double_bytes(&self, rows: usize) -> usize {
+        self.setups.iter().map(|setup| setup.backend.double_bytes(self.size[0], rows)).max().unwrap_or(0)
     }
 
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
         let rows = self.size[1].min(FEW_ROWS * TILE);
-        let fits = |f: &usize| self.bytes(*f, scene.most_planes(*f, config), rows) <= self.available;
+        let fits = |f: &usize| self.fits(*f, self.planes(scene.most_planes(*f, config)), rows);
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
-    /// The bands of rows to splat one after another, each as tall as fits.
-    pub(super) fn bands(&self, layout: &Layout) -> Vec<Range<usize>> {
-        let rows = |tiles: usize| (tiles * TILE).min(self.size[1]);
-        let fits = |tiles: &usize| self.bytes(layout.frames, layout.planes(), rows(*tiles)) <= self.available;
-        let rows = rows((1..=self.size[1].div_ceil(TILE)).rev().find(fits).unwrap_or(1));
-        (0..self.size[1]).step_by(rows).map(|y| y..y.saturating_add(rows).min(self.size[1])).collect()
+    /// The next band of rows to splat, from row `start` on: one of as few as fit, and of nearly the same height.
+    pub(super) fn band(&self, layout: &Layout, start: usize) -> BandPlan {
+        let left = self.size[1] - start;
+        let rows = |tiles: usize| (tiles * TILE).min(left);
+        let fits = |tiles: &usize| self.fits(layout.frames, self.planes(layout.planes()), rows(*tiles));
+        let most = rows((1..=left.div_ceil(TILE)).rev().find(fits).unwrap_or(1));
+        let rows = rows(left.div_ceil(left.div_ceil(most)).div_ceil(TILE));
+        self.plan(layout, start..start + rows)
+    }
+
+    /// The plan of a band of these rows.
+    pub(super) fn plan(&self, layout: &Layout, rows: Range<usize>) -> BandPlan {
+        let blocks = self.batch(layout, rows.len());
+        let used = self.used(layout, rows.len(), (blocks, 0));
+        let planes = self.all_double(layout.planes());
+        let left = self.available.saturating_sub(used) / self.double_bytes(rows.len()).max(1);
+        // Each thread may begin a plane before it sees that there is no room, and filters one.
+        let most = left.saturating_sub(rayon::current_num_threads()).min(planes.doubles);
+        // The lowest band fits with all planes in f64.
+        let most = if rows.len() <= TILE { planes.doubles } else { most };
+        BandPlan { rows, blocks, room: DoubleRoom::new(most) }
+    }
+
+    /// Bytes for a band of `rows` rows, with some blocks decoded at a time and some planes in f64.
+    fn used(&self, layout: &Layout, rows: usize, (blocks, doubles): (usize, usize)) -> usize {
+        let planes = Planes { all: layout.planes(), doubles };
+        self.picture_bytes(layout.frames) + self.band_bytes(planes, rows) + blocks * self.block_bytes(planes.all)
+    }
+
+    /// Notes how many planes of a band needed sums in f64, and returns the bytes that the whole plan allows. Of a band that
+    /// had too little room, only some planes have been seen: then the next one gets room for twice as many.
+    pub(super) fn note(&self, layout: &Layout, band: &BandPlan) -> usize {
+        let seen = if band.room.is_exceeded() { 2 * band.room.used() } else { band.room.used() };
+        self.doubles.fetch_max(seen, Relaxed);
+        self.fixed + self.used(layout, band.rows.len(), (band.blocks, band.room.granted()))
     }
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
-    pub(super) fn batch(&self, layout: &Layout, rows: usize) -> usize {
-        let used = self.picture_bytes(layout.frames) + self.band_bytes(layout.planes(), rows);
+    fn batch(&self, layout: &Layout, rows: usize) -> usize {
+        let used = self.used(layout, rows, (0, self.planes(layout.planes()).doubles));
         // The lattice reads its blocks plane by plane, so few blocks stay in the caches.
         let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()
@@ -192,7 +264,7 @@ const FEW_ROWS: usize = 4;
 /// Bytes that do not depend on how the work is divided, weights included.
 fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     let [width, height] = config.size();
-    let ones = |setup: &ViewSetup| setup.backend.ones(width, height) * size_of::<f64>();
+    let ones = |setup: &ViewSetup| setup.backend.ones_bytes(width, height);
     memory::FIXED + setups.len() * width * height * WEIGHT_BYTES + setups.iter().map(ones).sum::<usize>()
 }
 

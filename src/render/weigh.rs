@@ -6,7 +6,7 @@ use super::layout::{Layout, Order};
 use super::plan::Budget;
 use super::plane_values::{BlockPlanes, BlockSource, UnitValues};
 use super::splat::reference_weights::ReferenceWeights;
-use super::splat::{BandAccumulator, FilteredCells, Pixels, ResolvedTile, ViewSetup, splat};
+use super::splat::{BandAccumulator, DoubleRoom, FilteredCells, Pixels, ResolvedTile, ViewSetup, splat};
 use super::weights::{WeightedView, Weights};
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Region};
@@ -83,16 +83,18 @@ fn sums(setup: &ViewSetup, budget: &Budget<'_>) -> Result<(Vec<f64>, Option<Filt
     let layout =
         Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
     let (mut out, mut cells) = (vec![0.0; setup.pixels()], None);
-    let whole = 0..setup.camera.size[1];
-    // The cells of a lattice are kept whole.
-    let bands = if setup.backend.is_lattice() { vec![whole] } else { budget.bands(&layout) };
-    for rows in bands {
-        let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();
-        let mut accumulator = BandAccumulator::new(setup, rows.clone(), &layout);
-        let batch = budget.batch(&layout, rows.len());
-        splat(std::slice::from_mut(&mut accumulator), (&blocks, batch), &Ones(&setup.blocks))?;
+    let (mut start, end) = (0, setup.camera.size[1]);
+    let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();
+    while start < end {
+        // The cells of a lattice are kept whole.
+        let is_whole = setup.backend.is_lattice();
+        let plan = if is_whole { budget.plan(&layout, 0..end) } else { budget.band(&layout, start) };
+        let mut accumulator = BandAccumulator::new(setup, plan.rows.clone(), &layout);
+        let blocks = (&blocks[..], plan.blocks);
+        splat(std::slice::from_mut(&mut accumulator), blocks, &Ones(&setup.blocks), &DoubleRoom::new(1))?;
         accumulator.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
         cells = accumulator.into_filtered();
+        start = plan.rows.end;
     }
     Ok((out, cells))
 }

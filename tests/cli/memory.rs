@@ -49,3 +49,18 @@ fn archives_much_larger_than_the_budget_stay_within_it() {
     work.shell(&format!("{limit} exec $WAVESPLAT verify file.wspl {common}")).ok();
     assert_eq!(work.read("e.raw").len(), 4 * x * y * z);
 }
+
+#[test]
+fn pictures_take_what_they_plan() {
+    let work = Work::new();
+    write_sparse(&work, "a.raw", [128, 128, 128, 32]);
+    work.wavesplat("convert a.raw --dims 128x128x128x32 --dtype f32 --level 1 -o a.wspl").ok();
+    for tolerance in ["", "--tolerance 0.1", "--frames 3,4,9"] {
+        let command = format!("a.wspl --threads 2 -o v.npy --force {tolerance}");
+        let report = work.render(&format!("{command} --json")).ok().json();
+        let planned = report["planned_bytes"].as_u64().unwrap() as usize >> 20;
+        assert!(planned <= 512);
+        let limit = format!("ulimit -d {};", (planned + SLACK_MIB) << 10);
+        work.shell(&format!("{limit} exec $RENDER {command} --memory {}MiB", planned + 1)).ok();
+    }
+}

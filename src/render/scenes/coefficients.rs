@@ -23,7 +23,7 @@ use crate::render::scene::{
 };
 use crate::wavelet::Lane;
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind};
+use wavesplat_format::{BlockEntry, BlockStats, LeafEntry, PartEntry, PartKind};
 
 /// A coefficient file as a scene.
 pub struct CoefficientScene {
@@ -70,6 +70,27 @@ impl CoefficientScene {
     }
 }
 
+impl CoefficientScene {
+    fn windows(&self) -> u32 {
+        self.file.metadata().windows.len() as u32
+    }
+
+    /// The directory's leaves of a window, of all channels.
+    fn leaves(&self, window: u32) -> impl Iterator<Item = &LeafEntry> {
+        (0..self.file.channels()).flat_map(move |channel| self.file.leaves_of(window, channel))
+    }
+
+    /// An upper bound of the codes and outliers that a block stores.
+    fn most_stored(&self) -> usize {
+        let stored = |leaf: &LeafEntry| leaf.coded.saturating_add(leaf.outliers) as usize;
+        let most = (0..self.windows()).flat_map(|window| self.leaves(window)).map(stored).max().unwrap_or(0);
+        most.min(2 * self.file.largest_block())
+    }
+}
+
+/// Bytes of a stored code or outlier: packed, and unpacked in vectors that grow.
+const STORED_BYTES: usize = 32;
+
 impl From<CoefficientFile> for CoefficientScene {
     /// Splats the file's coefficients.
     fn from(file: CoefficientFile) -> Self {
@@ -106,18 +127,27 @@ impl Scene for CoefficientScene {
         if !config.mode.is_projection() {
             return 2 * frames + 1; // values, not coefficients
         }
-        let windows = &self.file.metadata().windows;
-        let most = windows.iter().map(|w| w.coefficients as usize + error_planes(config, w.parts())).max();
-        most.unwrap_or(0) + 2 * frames + 1
+        let planes = |window: u32| {
+            let record = &self.file.metadata().windows[window as usize];
+            let (missing, exact) = (self.file.has_missing(window), self.leaves(window).any(|leaf| leaf.exact > 0));
+            let is_coded = self.what == SplatSource::Coefficients;
+            let values = if !is_coded || exact || missing || record.outliers > 0 { frames } else { 0 };
+            let coefficients = if is_coded { record.coefficients as usize } else { 0 };
+            let absent = if missing { frames + 1 } else { 0 };
+            coefficients.max(frames) + values + absent + error_planes(config, record.parts())
+        };
+        (0..self.windows()).map(planes).max().unwrap_or(0)
     }
 
     fn block_bytes(&self) -> usize {
         let windows = &self.file.metadata().windows;
-        // Codes, payload and samples; decoded values of a pyramid; a mask and corrections if samples are missing.
-        let refined = if windows.iter().any(|w| w.pyramid.is_some()) { 8 } else { 0 };
-        let missing = (0..windows.len() as u32).any(|window| self.file.has_missing(window));
-        let missing = if missing { 1 + 32 + 24 } else { 0 };
-        self.file.largest_block() * (4 + 5 + 8 + refined + missing)
+        let is_double = windows.iter().filter_map(|w| w.pyramid.as_ref()).any(|pyramid| !pyramid.single);
+        let any = |of: &dyn Fn(u32) -> bool| usize::from((0..self.windows()).any(of));
+        // Codes or nodes, and the values of all frames; what is stored exactly; a mask and corrections.
+        let refined = if is_double { size_of::<f64>() } else { size_of::<f32>() } + size_of::<f64>();
+        let exact = any(&|window| self.leaves(window).any(|leaf| leaf.exact > 0)) * 2 * self.file.sample().size();
+        let missing = any(&|window| self.file.has_missing(window)) * (1 + 32 + 24);
+        self.file.largest_block() * (refined + exact + missing) + self.most_stored() * STORED_BYTES
     }
 
     fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {

@@ -3,7 +3,7 @@
 use super::backend::SplatBackend;
 use super::band::{Band, SplatStats, splat_in_batches};
 use super::footprints::{FootprintBands, Tile};
-use super::lattice::{Cells, FilteredCells, Gather, Lattice, Ones};
+use super::lattice::{Cells, DoubleRoom, FilteredCells, Gather, Lattice, Ones};
 use super::lattice_bands::LatticeBands;
 use super::tile_rect::{TILE, TileRect};
 use super::view_setup::ViewSetup;
@@ -162,11 +162,13 @@ impl<T: Copy> Pixels<'_, T> {
 }
 
 /// Splats all blocks in order, `batch` at a time, each into all bands that it reaches. A block is decoded once for all
-/// bands that take footprints, and once for all bands that have a lattice.
+/// bands that take footprints, and once for all bands that have a lattice. If these need more `room` than there is, the
+/// bands have no sums.
 pub(in crate::render) fn splat(
     accumulators: &mut [BandAccumulator<'_>],
     blocks: (&[usize], usize),
     source: &dyn BlockSource,
+    room: &DoubleRoom,
 ) -> Result<SplatStats> {
     let (mut tiles, mut cells) = (Vec::new(), Vec::new());
     let planes = accumulators.first().map_or(0, |accumulator| accumulator.planes);
@@ -178,7 +180,9 @@ pub(in crate::render) fn splat(
         }
     }
     let mut stats = splat_in_batches(&mut FootprintBands::new(tiles, planes), blocks, source)?;
-    stats += splat_in_batches(&mut LatticeBands::new(cells), blocks, source)?;
-    accumulators.iter_mut().for_each(BandAccumulator::filter);
+    stats += splat_in_batches(&mut LatticeBands::new(cells, room), blocks, source)?;
+    if !room.is_exceeded() {
+        accumulators.iter_mut().for_each(BandAccumulator::filter);
+    }
     Ok(stats)
 }

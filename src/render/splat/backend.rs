@@ -85,20 +85,27 @@ impl SplatBackend {
         }
     }
 
-    /// An upper bound of the f64 numbers for `planes` planes in a band of `width` x `rows` pixels.
-    pub(in crate::render) fn band_sums(&self, width: usize, rows: usize, planes: usize) -> usize {
+    /// An upper bound of the bytes for `planes` planes in a band of `width` x `rows` pixels, without
+    /// [`Self::double_bytes`].
+    pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
         match self {
-            Self::Footprints => planes * width * rows.next_multiple_of(TILE),
-            Self::Lattice(lattice) => lattice.band_sums(width, rows, planes),
+            Self::Footprints => planes * width * rows.next_multiple_of(TILE) * size_of::<f64>(),
+            Self::Lattice(lattice) => lattice.band_bytes(width, rows, planes),
         }
     }
 
-    /// An upper bound of the sums of the whole picture that a lattice keeps: the cells of ones, and scratch for them.
-    pub(in crate::render) fn ones(&self, width: usize, height: usize) -> usize {
+    /// An upper bound of the bytes that a plane of a band takes in addition if it needs sums in f64.
+    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
         match self {
             Self::Footprints => 0,
-            Self::Lattice(_) => 3 * self.band_sums(width, height, 1),
+            Self::Lattice(lattice) => lattice.double_bytes(width, rows),
         }
+    }
+
+    /// An upper bound of the bytes for the sums of the whole picture that a lattice keeps: the cells of ones, and as many
+    /// while they are filtered.
+    pub(in crate::render) fn ones_bytes(&self, width: usize, height: usize) -> usize {
+        2 * self.double_bytes(width, height)
     }
 
     /// The f64 numbers that may be kept with a block while it is splatted.

@@ -58,11 +58,16 @@ pub(super) trait BandGroup: Sync {
     /// Prepares a block. Called by several threads.
     fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<Self::Block<'b>>;
 
+    /// Whether the sums need more memory than they have, and are of no use.
+    fn is_full(&self) -> bool {
+        false
+    }
+
     /// Adds blocks in order.
     fn add(&mut self, blocks: &[Self::Block<'_>]) -> Result<()>;
 }
 
-/// Splats the blocks that reach any band, in order, `batch` at a time.
+/// Splats the blocks that reach any band, in order, `batch` at a time. Ends early if the group is full.
 pub(super) fn splat_in_batches(
     group: &mut impl BandGroup,
     (blocks, batch): (&[usize], usize),
@@ -70,7 +75,7 @@ pub(super) fn splat_in_batches(
 ) -> Result<SplatStats> {
     let is_visible = |block: &usize| group.bands().iter().any(|band| band.sees(*block));
     let visible: Vec<usize> = blocks.iter().copied().filter(is_visible).collect();
-    let mut stats = SplatStats { blocks: visible.len() as u64, ..SplatStats::default() };
+    let mut stats = SplatStats::default();
     source.fetch(&visible)?;
     for blocks in visible.chunks(batch) {
         let clock = Instant::now();
@@ -82,12 +87,16 @@ pub(super) fn splat_in_batches(
         let (held, ready): (Vec<_>, Vec<_>) =
             blocks.par_iter().map(read).collect::<Result<Vec<_>>>()?.into_iter().unzip();
         stats.decode += clock.elapsed();
+        stats.blocks += blocks.len() as u64;
         let clock = Instant::now();
         group.add(&ready)?;
         stats.splat += clock.elapsed();
         for [coefficients, bytes] in held {
             stats.coefficients += coefficients;
             stats.bytes += bytes;
+        }
+        if group.is_full() {
+            break;
         }
     }
     Ok(stats)

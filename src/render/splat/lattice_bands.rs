@@ -1,7 +1,7 @@
 //! The lattice backend: spreads the values of all voxels, plane by plane, to the cells of each view's lattice.
 
 use super::band::{Band, BandGroup};
-use super::lattice::{CellPlane, Cells, Lattice, Placed, Rectangle, Work};
+use super::lattice::{CellPlane, Cells, DoubleRoom, Lattice, Placed, Rectangle, Work};
 use crate::base::error::Result;
 use crate::render::plane_values::{BlockPlanes, Scratch};
 use rayon::prelude::*;
@@ -14,6 +14,7 @@ pub(super) struct LatticeBands<'a, 'c> {
     cells: Vec<&'c mut Cells>,
     /// The cells of each band.
     rectangles: Vec<Rectangle>,
+    room: &'c DoubleRoom,
     /// Buffers for reuse: fresh memory from the system costs as much as the work done in it.
     spare: Mutex<Vec<(Scratch, Work<f32>)>>,
 }
@@ -25,12 +26,13 @@ pub(super) struct PlacedBlock<'b> {
 }
 
 impl<'a, 'c> LatticeBands<'a, 'c> {
-    pub(super) fn new(bands: Vec<(Band<'a>, &'a Lattice, &'c mut Cells)>) -> Self {
+    pub(super) fn new(bands: Vec<(Band<'a>, &'a Lattice, &'c mut Cells)>, room: &'c DoubleRoom) -> Self {
         let mut group = Self {
             bands: Vec::new(),
             lattices: Vec::new(),
             cells: Vec::new(),
             rectangles: Vec::new(),
+            room,
             spare: Mutex::default(),
         };
         for (band, lattice, cells) in bands {
@@ -62,10 +64,17 @@ impl BandGroup for LatticeBands<'_, '_> {
         Ok(PlacedBlock { planes, placed })
     }
 
+    fn is_full(&self) -> bool {
+        self.room.is_exceeded()
+    }
+
     /// Each plane has one owner, so that its sums do not depend on threads.
     fn add(&mut self, blocks: &[PlacedBlock<'_>]) -> Result<()> {
-        let spare = &self.spare;
-        by_planes(&mut self.cells).into_par_iter().enumerate().try_for_each(|(plane, mut bands)| {
+        let (spare, room) = (&self.spare, self.room);
+        by_planes(&mut self.cells, room).into_par_iter().enumerate().try_for_each(|(plane, mut bands)| {
+            if room.is_exceeded() {
+                return Ok(());
+            }
             let (mut scratch, mut work) = lock(spare).pop().unwrap_or_default();
             for PlacedBlock { planes, placed } in blocks {
                 let values = planes.plane(plane, &mut scratch)?;
@@ -84,10 +93,10 @@ fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// For every plane, its cells in all bands.
-fn by_planes<'a>(cells: &'a mut [&mut Cells]) -> Vec<Vec<CellPlane<'a>>> {
+fn by_planes<'a>(cells: &'a mut [&mut Cells], room: &'a DoubleRoom) -> Vec<Vec<CellPlane<'a>>> {
     let mut planes: Vec<Vec<CellPlane<'_>>> = Vec::new();
     for of_band in cells {
-        let of_band = of_band.planes_mut();
+        let of_band = of_band.planes_mut(room);
         planes.resize_with(of_band.len(), Vec::new);
         planes.iter_mut().zip(of_band).for_each(|(plane, sums)| plane.push(sums));
     }

@@ -24,5 +24,5 @@ pub(super) mod accumulator;
 
 pub(super) use accumulator::{BandAccumulator, Pixels, ResolvedTile, splat};
 pub(super) use band::SplatStats;
-pub(in crate::render) use lattice::{FilteredCells, Ones};
+pub(in crate::render) use lattice::{DoubleRoom, FilteredCells, Ones};
 pub(super) use view_setup::ViewSetup;

@@ -1,8 +1,10 @@
 //! The cells (eq 35) of a band of a picture, with planes of sums.
 
+use super::filtered::TOGETHER;
 use crate::base::zeroed::Zeroed;
 use crate::codec::real::Real;
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A rectangle of cells with planes of sums.
 ///
@@ -11,8 +13,8 @@ use std::ops::Range;
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
     pub(super) rectangle: Rectangle,
-    /// The sums of ordinary values, plane by plane.
-    pub(super) single: Zeroed<f32>,
+    /// The sums of ordinary values, plane by plane, [`TOGETHER`] planes at most in each buffer.
+    pub(super) single: Vec<Zeroed<f32>>,
     /// For each plane, the sums of values that sums in f32 cannot hold, and of the middles of blocks. A plane is the sum
     /// of both.
     pub(super) planes: Vec<PlaneSums>,
@@ -25,6 +27,35 @@ pub(super) struct PlaneSums {
     pub(super) has_single: bool,
     /// The sums in f64, allocated with the first value.
     pub(super) double: Option<Aligned<f64>>,
+}
+
+/// Room for planes with sums in f64. Which planes need them shows only when their blocks are added.
+#[derive(Debug)]
+pub(in crate::render) struct DoubleRoom {
+    used: AtomicUsize,
+    most: usize,
+}
+
+impl DoubleRoom {
+    /// Room for `most` planes.
+    pub(in crate::render) fn new(most: usize) -> Self {
+        Self { used: AtomicUsize::new(0), most }
+    }
+
+    /// The number of planes that have sums in f64.
+    pub(in crate::render) fn used(&self) -> usize {
+        self.used.load(Relaxed)
+    }
+
+    /// The number of planes that have sums in f64 and room.
+    pub(in crate::render) fn granted(&self) -> usize {
+        self.used().min(self.most)
+    }
+
+    /// Whether more planes need sums in f64 than have room. Then the sums are of no use.
+    pub(in crate::render) fn is_exceeded(&self) -> bool {
+        self.used() > self.most
+    }
 }
 
 /// The extent of a rectangle of cells and its layout in memory.
@@ -149,17 +180,18 @@ impl Cells {
 
     /// Cells with all planes at zero.
     pub(super) fn new(rectangle: Rectangle, planes: usize) -> Self {
-        let single = Zeroed::new(planes * rectangle.area());
+        let buffer = |first: usize| Zeroed::new(TOGETHER.min(planes - first) * rectangle.area());
+        let single = (0..planes).step_by(TOGETHER).map(buffer).collect();
         Self { rectangle, single, planes: (0..planes).map(|_| PlaneSums::default()).collect() }
     }
 
-    /// All planes, for adding values.
-    pub(in crate::render) fn planes_mut(&mut self) -> Vec<CellPlane<'_>> {
+    /// All planes, for adding values. Planes with sums in f64 take `room`.
+    pub(in crate::render) fn planes_mut<'a>(&'a mut self, room: &'a DoubleRoom) -> Vec<CellPlane<'a>> {
         let rectangle = self.rectangle;
-        let single = self.single.chunks_exact_mut(rectangle.area().max(1));
+        let single = self.single.iter_mut().flat_map(|planes| planes.chunks_exact_mut(rectangle.area().max(1)));
         // A rectangle without cells has no chunks.
         let single = single.map(Some).chain(std::iter::repeat_with(|| None)).map(Option::unwrap_or_default);
-        self.planes.iter_mut().zip(single).map(|(sums, single)| CellPlane { rectangle, single, sums }).collect()
+        self.planes.iter_mut().zip(single).map(|(sums, single)| CellPlane { rectangle, single, sums, room }).collect()
     }
 }
 
@@ -172,8 +204,11 @@ impl CellPlane<'_> {
 
     /// The sums in f64; allocates them as zeros if necessary.
     pub(super) fn double(&mut self) -> &mut [f64] {
-        let area = self.rectangle.area();
-        self.sums.double.get_or_insert_with(|| Aligned::of(area))
+        let (area, room) = (self.rectangle.area(), self.room);
+        self.sums.double.get_or_insert_with(|| {
+            room.used.fetch_add(1, Relaxed);
+            Aligned::of(area)
+        })
     }
 
     /// Adds `scale` times the cells of another rectangle to the sums in f32.
@@ -221,6 +256,7 @@ pub(in crate::render) struct CellPlane<'a> {
     pub(super) rectangle: Rectangle,
     single: &'a mut [f32],
     sums: &'a mut PlaneSums,
+    room: &'a DoubleRoom,
 }
 
 #[cfg(test)]

@@ -57,16 +57,18 @@ pub(super) fn side_by_side(planes: usize) -> usize {
 }
 
 impl FilteredCells {
-    /// Filters all planes along u and v.
+    /// Filters all planes along u and v. The sums of a group are freed before the next group is filtered.
     pub(super) fn new(cells: Cells, taps: &[Taps; 2]) -> Self {
-        let Cells { rectangle, mut single, planes } = cells;
+        let Cells { rectangle, single, planes } = cells;
         let [along, across] = taps;
-        let numbered = planes.iter().zip(single.chunks_exact_mut(rectangle.area().max(1))).enumerate();
-        let with_sums = numbered.filter(|(_, (sums, _))| sums.has_single);
-        let singles: Vec<_> = with_sums.map(|(number, (_, single))| (number, single)).collect();
-        let singles = singles.into_par_iter().map(|(number, sums)| Rows::new(&rectangle, number, sums, along));
-        let singles: Vec<Rows<'_, f32>> = singles.collect();
-        let groups = groups(&rectangle, &singles, across);
+        let of_group = |(n, (mut sums, planes)): (usize, (Zeroed<f32>, &[PlaneSums]))| {
+            let numbered = (n * TOGETHER..).zip(planes.iter().zip(sums.chunks_exact_mut(rectangle.area().max(1))));
+            let with_sums: Vec<_> = numbered.filter(|(_, (plane, _))| plane.has_single).collect();
+            let filter = |(number, (_, sums))| Rows::new(&rectangle, number, sums, along);
+            let rows: Vec<Rows<'_, f32>> = with_sums.into_par_iter().map(filter).collect();
+            (!rows.is_empty()).then(|| group(&rectangle, &rows, across))
+        };
+        let groups = single.into_iter().zip(planes.chunks(TOGETHER)).enumerate().filter_map(of_group).collect();
         let doubles = planes.into_par_iter().enumerate();
         let doubles = doubles.filter_map(|(number, PlaneSums { double, .. })| Some((number, double?)));
         let filter = |(number, mut sums): (usize, Aligned<f64>)| {
@@ -108,25 +110,22 @@ struct Rows<'a, R> {
 }
 
 /// Filters planes along v, and puts them side by side.
-fn groups(rectangle: &Rectangle, planes: &[Rows<'_, f32>], taps: &Taps) -> Vec<Group> {
+fn group(rectangle: &Rectangle, planes: &[Rows<'_, f32>], taps: &Taps) -> Group {
     let taps = taps.map(|tap| tap as f32);
     let [width, height] = rectangle.size;
-    let group = |planes: &[Rows<'_, f32>]| {
-        let (stride, places) = (width + 1, places(planes.len()));
-        let mut cells = Zeroed::new(stride * height * places);
-        cells.par_chunks_exact_mut((stride * places).max(1)).enumerate().for_each(|(v, cells)| {
-            let mut row = vec![0.0; width];
-            for (place, plane) in planes.iter().enumerate() {
-                if plane.is_near(v) {
-                    plane.filter_row(v, width, &taps, &mut row);
-                    cells[place..].iter_mut().step_by(places).zip(&row).for_each(|(to, from)| *to = *from);
-                }
+    let (stride, places) = (width + 1, places(planes.len()));
+    let mut cells = Zeroed::new(stride * height * places);
+    cells.par_chunks_exact_mut((stride * places).max(1)).enumerate().for_each(|(v, cells)| {
+        let mut row = vec![0.0; width];
+        for (place, plane) in planes.iter().enumerate() {
+            if plane.is_near(v) {
+                plane.filter_row(v, width, &taps, &mut row);
+                cells[place..].iter_mut().step_by(places).zip(&row).for_each(|(to, from)| *to = *from);
             }
-        });
-        let spans = planes.iter().map(Rows::spread_spans).collect();
-        Group { planes: planes.iter().map(|plane| plane.number).collect(), places, stride, cells, spans }
-    };
-    planes.chunks(TOGETHER).map(group).collect()
+        }
+    });
+    let spans = planes.iter().map(Rows::spread_spans).collect();
+    Group { planes: planes.iter().map(|plane| plane.number).collect(), places, stride, cells, spans }
 }
 
 /// Filters a plane along v.

@@ -35,6 +35,7 @@ mod gather;
 #[cfg(test)]
 mod tests;
 
+pub(in crate::render) use cells::DoubleRoom;
 pub(super) use cells::{CellPlane, Cells, Rectangle};
 pub(super) use error::SliceError;
 pub(in crate::render) use filtered::FilteredCells;

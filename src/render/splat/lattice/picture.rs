@@ -3,7 +3,7 @@
 
 use super::cells::{Cells, LINE, Rectangle};
 use super::error::{SliceError, Weighting};
-use super::filtered::{FilteredCells, side_by_side};
+use super::filtered::{FilteredCells, places, side_by_side};
 use super::kernel::Kernel;
 use super::prefilter::{self, HALF, Taps};
 use super::product::Product;
@@ -243,9 +243,14 @@ impl Lattice {
         self.cells_reached(&(0..width), &(0..height)).1
     }
 
-    /// An upper bound of the f64 numbers for the planes of a band: in f32, in f64, and in f32 side by side.
-    pub(in crate::render) fn band_sums(&self, width: usize, rows: usize, planes: usize) -> usize {
-        ((planes + side_by_side(planes)).div_ceil(2) + planes) * self.band_cells(width, rows)
+    /// An upper bound of the bytes for the planes of a band in f32: their sums, and a group of them side by side.
+    pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
+        (planes + places(planes)) * self.band_cells(width, rows) * size_of::<f32>()
+    }
+
+    /// An upper bound of the bytes for a plane of a band in f64.
+    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
+        self.band_cells(width, rows) * size_of::<f64>()
     }
 
     /// An upper bound of the cells of a plane of a band.

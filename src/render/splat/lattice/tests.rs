@@ -99,7 +99,8 @@ fn slices_spread_like_single_values() {
         let ways =
             [PlaneValues::Double(&values), PlaneValues::Single(&single), PlaneValues::Few(&few), PlaneValues::Nothing];
         let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), Work::default());
-        let into = planes.planes_mut().into_iter().zip(ways);
+        let room = DoubleRoom::new(ways.len() + 1);
+        let into = planes.planes_mut(&room).into_iter().zip(ways);
         into.for_each(|(mut plane, values)| placed.add(values, &mut plane, &mut work));
         let planes = touched(&planes);
         let numbers: Vec<usize> = planes.iter().map(|(number, _)| *number).collect();
@@ -108,7 +109,7 @@ fn slices_spread_like_single_values() {
         let whole = Rectangle::holding(low, [0, 1].map(|i| (high[i] - low[i]).max(0) as usize + 1), fineness);
         let mut all = Cells::new(whole, 1);
         let placed = Placed::new(&spreading, &block, &clip, &whole);
-        placed.add(PlaneValues::Double(&values), &mut all.planes_mut()[0], &mut work);
+        placed.add(PlaneValues::Double(&values), &mut all.planes_mut(&room)[0], &mut work);
         let all = touched(&all);
         let all: BTreeMap<[isize; 2], f64> = all.iter().flat_map(|(_, plane)| cells_of(&whole, plane)).collect();
         for (number, plane) in planes.iter().filter(|(number, _)| *number < 2) {
@@ -133,7 +134,7 @@ fn slices_spread_like_single_values() {
 
 /// The planes with sums.
 fn touched(cells: &Cells) -> Vec<(usize, Vec<f64>)> {
-    let single = cells.single.chunks_exact(cells.rectangle.area());
+    let single = cells.single.iter().flat_map(|planes| planes.chunks_exact(cells.rectangle.area()));
     let planes = single.zip(&cells.planes).enumerate();
     let with_sums = planes.filter(|(_, (_, sums))| sums.has_single || sums.double.is_some());
     let all = |(number, (single, sums)): (usize, (&[f32], &super::cells::PlaneSums))| {
