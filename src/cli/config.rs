@@ -1,7 +1,7 @@
 //! Options from a TOML file.
 //!
 //! Its keys are the long names of options. A key at the top level is for every command that has the option; a key in a
-//! table is for the command of that name. The options are inserted before those of the command line, which override
+//! table is for the command or program of that name. The options are inserted before those of the command line, which override
 //! them.
 
 use crate::base::error::{Error, Result};
@@ -19,7 +19,8 @@ const CONFIG: &str = "config";
 
 /// Names of tables that are for the other program or for one of its commands.
 const PROGRAMS: [&str; 2] = ["wavesplat", "wavesplat-render"];
-const COMMANDS: [&str; 7] = ["convert", "append", "info", "verify", "extract", "recover", "generate"];
+const COMMANDS: [&str; 10] =
+    ["convert", "append", "info", "verify", "extract", "recover", "scan", "merge", "view", "generate"];
 
 /// The subcommand that was given, or the program itself.
 pub(super) fn chosen_command<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
@@ -107,7 +108,7 @@ impl File<'_> {
             if self.is_of_another(name.get_ref()) {
                 continue;
             }
-            let Some(owner) = self.program.find_subcommand(name.get_ref().as_ref()) else {
+            let Some(owner) = self.owner(name.get_ref()) else {
                 let what = format!("[{}] is not a command of {}", name.get_ref(), self.program.get_name());
                 return Err(self.wrong(&name.span(), &what));
             };
@@ -126,6 +127,12 @@ impl File<'_> {
             }
         }
         Ok(options)
+    }
+
+    /// The command that a table is for, if the program has it.
+    fn owner(&self, table: &str) -> Option<&Command> {
+        let is_program = !self.program.has_subcommands() && table == self.program.get_name();
+        if is_program { Some(self.program) } else { self.program.find_subcommand(table) }
     }
 
     /// Whether a table is for the other program, which may read the same file.

@@ -125,3 +125,22 @@ fn info_gives_the_options_that_reproduce_a_file() {
         assert!(work.wavesplat("info a.wspl").ok().text().contains(&format!("made by    convert{again}")), "{again}");
     }
 }
+
+#[test]
+fn one_file_serves_every_command_of_both_programs() {
+    let work = work("");
+    let help = work.wavesplat("--help").ok().text().to_string();
+    let listed = help.lines().skip_while(|line| !line.starts_with("Commands:")).skip(1).take_while(|l| !l.is_empty());
+    let first_lines = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let named = first_lines.filter_map(|line| line.split_whitespace().next());
+    let commands: Vec<&str> = named.filter(|command| *command != "help").collect();
+    assert!(commands.contains(&"convert") && commands.contains(&"merge"), "{commands:?}");
+    let tables: String = commands.iter().map(|command| format!("[{command}]\n")).collect();
+    work.write("run.toml", format!("tolerance = 0.1\n{tables}\n[wavesplat-render]\nsize = '20x10'\n"));
+    work.wavesplat("convert a.npy -o a.wspl --config run.toml").ok();
+    work.render("a.wspl --frames 0 -o own.npy --config run.toml").ok();
+    work.render("a.wspl --frames 0 -o said.npy --size 20x10 --tolerance 0.1").ok();
+    assert!(work.read("own.npy") == work.read("said.npy"));
+    work.write("wrong.toml", "[wavesplat-render]\nsizes = 1\n");
+    work.render("a.wspl --config wrong.toml -o x.npy").fails(2, &["line 2", "sizes: no option of wavesplat-render"]);
+}
