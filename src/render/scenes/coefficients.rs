@@ -89,7 +89,7 @@ impl CoefficientScene {
 }
 
 /// Bytes of a stored code or outlier: packed, and unpacked in vectors that grow.
-const STORED_BYTES: usize = 32;
+const STORED_BYTES: usize = 20;
 
 impl From<CoefficientFile> for CoefficientScene {
     /// Splats the file's coefficients.

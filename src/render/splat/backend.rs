@@ -85,6 +85,14 @@ impl SplatBackend {
         }
     }
 
+    /// Whether the tiles of these rows read sums that voxels of a region add to.
+    pub(super) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
+        match self {
+            Self::Footprints => false, // every sum belongs to a pixel
+            Self::Lattice(lattice) => lattice.tiles_read(region, width, rows),
+        }
+    }
+
     /// An upper bound of the bytes for `planes` planes in a band of `width` x `rows` pixels, without
     /// [`Self::double_bytes`].
     pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {

@@ -16,9 +16,10 @@ pub(super) struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Whether a block must be splatted into this band.
+    /// Whether a block must be splatted into this band: the picture sees it, and the band needs it.
     pub(super) fn sees(&self, block: usize) -> bool {
-        self.setup.sees(block, &self.rows)
+        let whole = 0..self.setup.camera.size[1];
+        self.setup.sees(block, &whole) && (self.rows == whole || self.setup.needs(block, &self.rows))
     }
 }
 

@@ -69,6 +69,12 @@ impl ViewSetup {
         self.reaches(block, rows) && !self.is_too_deep(block)
     }
 
+    /// Whether these rows of a picture change if a block that the picture sees is left out.
+    pub(in crate::render) fn needs(&self, block: usize, rows: &Range<usize>) -> bool {
+        let region = self.blocks.region(block).intersect(&self.clip);
+        self.reaches(block, rows) || !region.is_empty() && self.backend.tiles_read(&region, self.camera.size[0], rows)
+    }
+
     /// Whether any voxel of a block can reach these rows of the picture.
     pub(in crate::render) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
         overlap(&self.pixels_reached(&self.blocks.region(block))[1], rows)

@@ -11,7 +11,7 @@ use super::shear::Shear;
 use super::spline::{MOST_DEGREE, spread};
 use super::{Placed, Spreading};
 use crate::base::grid::{BlockGrid, Grid, Region};
-use crate::render::splat::tile_rect::{TILE, pixels_around};
+use crate::render::splat::tile_rect::{TILE, TileRect, pixels_around};
 use crate::view::camera::Camera;
 use crate::view::footprint::{Footprint, Kernel as Gaussian, Method};
 use std::ops::Range;
@@ -210,6 +210,20 @@ impl Lattice {
         let (first, cells) = self.filtered_rectangle(region);
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
+    }
+
+    /// Whether a block adds to any cell that the tiles of these rows read. Tiles take the mean of all cells that they read, also
+    /// of those that no pixel uses ([`super::bundle`]), so bands must not leave such a block out.
+    pub(in crate::render) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
+        let (first, cells) = self.filtered_rectangle(region);
+        let range = |first: [isize; 2], cells: [usize; 2], i: usize| first[i]..first[i] + cells[i] as isize;
+        TileRect::cover(width, rows.clone(), self.tile()).iter().any(|tile| {
+            let (tile_first, tile_cells) = self.cells_reached(&tile.x, &tile.y);
+            (0..2).all(|i| {
+                let (a, b) = (range(first, cells, i), range(tile_first, tile_cells, i));
+                a.start < b.end && b.start < a.end
+            })
+        })
     }
 
     /// The location in cells of a block's voxels, limited to a region. `extent` gives the cells of the planes.
