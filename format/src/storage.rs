@@ -19,7 +19,7 @@ pub trait Storage {
     /// Copies `out.len()` bytes from `offset`; an error if they are not all there.
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()>;
 
-    /// Copies several ranges, each of which lies within the storage; the bytes of each, in the order of `ranges`.
+    /// Copies several ranges, which must lie within the storage. Returns the bytes of each, in the order of `ranges`.
     ///
     /// The default reads one range after another. Storages that pay for every request send requests side by side.
     ///
@@ -42,8 +42,8 @@ pub trait Storage {
         Ok(())
     }
 
-    /// Whether every request costs much, however few its bytes are: true for remote storages. [`Self::fetch`] is then worth
-    /// while, and what was read should be kept.
+    /// Whether every request is slow, however few bytes it asks for: true for remote storages. Then calling
+    /// [`Self::fetch`] saves time, and bytes that were read should be kept.
     fn is_remote(&self) -> bool {
         false
     }

@@ -14,9 +14,9 @@ use std::ops::Range;
 const TOGETHER: u32 = 128;
 
 impl<S: Storage> Reader<S> {
-    /// Checks start, window sections, window's ends, description and the padding outside leaves. Together with [`Reader::open`], and
-    /// with [`Reader::check_leaf`] and [`Reader::check_parts`] for all leaves and blocks, this finds any changed bit of
-    /// the file. Calls `found` for each problem.
+    /// Checks the start, the window sections, the ends of windows, the description, and the padding outside leaves.
+    /// Together with [`Reader::open`], and with [`Reader::check_leaf`] and [`Reader::check_parts`] for all leaves and
+    /// blocks, this finds any changed bit of the file. Calls `found` for each problem.
     ///
     /// # Errors
     /// The storage fails.
@@ -41,7 +41,7 @@ impl<S: Storage> Reader<S> {
         note(check_padding(self.storage(), self.footer().last().end()), found)
     }
 
-    /// Prepares to read what is before and behind the blocks of some windows.
+    /// Fetches the bytes just before and after the blocks of some windows.
     fn fetch_ends(&self, windows: Range<u32>) -> Result<()> {
         let ends = |window| {
             let leaves = self.leaves(window);
@@ -53,8 +53,8 @@ impl<S: Storage> Reader<S> {
         Ok(self.storage().fetch(&ends)?)
     }
 
-    /// Checks the headers of consecutive blocks, of which the first begins at `at`, against their entries, and the padding
-    /// behind them. Calls `found` for each problem; returns where the next block begins.
+    /// Checks the headers of consecutive blocks against their entries, and the padding behind them. The first block
+    /// begins at `at`. Calls `found` for each problem; returns where the next block begins.
     ///
     /// # Errors
     /// The storage fails.

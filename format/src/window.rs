@@ -170,7 +170,7 @@ impl WindowEnd {
 }
 
 impl Window {
-    /// A window of which nothing says how it was coded: all its blocks are lost. It has no range, no bound and no totals.
+    /// A window whose coding is unknown: all its blocks are lost. It has no range, no bound and no totals.
     pub fn lost(first_frame: u64, frames: u32) -> Self {
         Self {
             first_frame,

@@ -52,8 +52,8 @@ impl Calendar {
         })
     }
 
-    /// Days from 0001-01-01 to a date, of which the standard calendar counts those of the Gregorian one; None if there is
-    /// no such date.
+    /// Days from 0001-01-01 to a date (for the standard calendar: from the Gregorian 0001-01-01). `None` if the date
+    /// does not exist.
     pub(super) fn day(self, date: Date) -> Option<i64> {
         let Date { year, month, day } = date;
         if self == Self::Standard {

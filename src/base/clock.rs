@@ -1,7 +1,6 @@
 //! What times count: a unit alone, or a unit since a date of a calendar, such as `days since 2000-01-01`.
 //!
-//! Times become whole femtoseconds, which is finer than what a double can tell from a date on, and go back by one
-//! division.
+//! Times are converted to whole femtoseconds, finer than an f64 resolves for any date, and back with one division.
 
 use super::calendar::{Calendar, Date};
 
@@ -35,10 +34,10 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// The clock of a unit such as `hours since 2000-01-01 06:00`, or `s`. The usual calendar has no name.
+    /// Parses a unit such as `hours since 2000-01-01 06:00`, or `s`. Without a calendar, the dates are those of the
+    /// standard calendar.
     ///
-    /// # Errors
-    /// What is not understood.
+    /// # Errors A message that names the unit or the calendar that is not understood.
     pub(crate) fn of(unit: &str, calendar: Option<&str>) -> Result<Self, String> {
         let unknown = || format!("the unit {unit:?} is not understood");
         let (name, since) = match unit.split_whitespace().collect::<Vec<_>>()[..] {

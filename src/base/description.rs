@@ -45,7 +45,7 @@ pub fn narrowed(description: &Description, frames: &[usize], region: &Region, st
     narrow
 }
 
-/// Moves the place of the first voxel along an axis of the array to an index, and takes longer steps from there.
+/// Moves the first voxel to `index` along an axis of the array, and multiplies the step along this axis by `longer`.
 fn move_first(narrow: &mut Description, description: &Description, axis: &ArrayAxis, (index, longer): (usize, usize)) {
     let voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some());
     let (Some(place), Some(orientation)) = (voxels.clone().position(|other| other == axis), &mut narrow.orientation)
@@ -81,7 +81,7 @@ pub(crate) fn select(values: &Values, lengths: &[usize], kept: &[Kept]) -> Value
     }
 }
 
-/// The places in an array of these lengths, the last fastest, of the kept items along each axis.
+/// Flat indices of the kept items in an array of these lengths, the last axis fastest.
 fn places<'a>(lengths: &[usize], kept: impl Iterator<Item = &'a Kept>) -> Vec<usize> {
     lengths.iter().zip(kept).fold(vec![0], |places, (length, kept)| {
         let along = |place: usize| match kept {
@@ -92,8 +92,8 @@ fn places<'a>(lengths: &[usize], kept: impl Iterator<Item = &'a Kept>) -> Vec<us
     })
 }
 
-/// The description of the frames of `first`, then those of each of `more`: values along time follow each other, all else
-/// is that of `first`. Variables along time that one lacks, or has in another form, are left out; their names are returned.
+/// Joins descriptions in time: values along time follow each other, and everything else is taken from `first`. Leaves
+/// out variables along time that one of them lacks or has in another form, and returns their names.
 pub fn joined(mut first: Description, more: &[Description]) -> (Description, Vec<String>) {
     let Some(time) = frames_of(&first) else { return (first, Vec::new()) };
     let (mut lost, mut kept) = (Vec::new(), Vec::new());
@@ -114,8 +114,8 @@ pub fn joined(mut first: Description, more: &[Description]) -> (Description, Vec
     (first, lost)
 }
 
-/// The description of so many frames in all, if nothing else is known of those that were added. Variables along time are left out, but for
-/// those of times; their names are returned.
+/// Extends a description to `frames` frames, without knowing values for the added ones. Leaves out the variables along
+/// time, except those that hold the times, and returns the names of those left out.
 pub fn extended(mut all: Description, frames: u64) -> (Description, Vec<String>) {
     let mut lost = Vec::new();
     let Some(time) = frames_of(&all) else { return (all, lost) };
@@ -127,8 +127,8 @@ pub fn extended(mut all: Description, frames: u64) -> (Description, Vec<String>)
     (all, lost)
 }
 
-/// The description of an array without an axis of frames, as one of which so many follow each other: the slowest axis
-/// counts frames. It has the name of the variable with the time.
+/// Adds a slowest axis of `frames` frames to a description that has no axis of frames. The axis is named after the
+/// variable that holds the times.
 pub fn with_frames(mut description: Description, frames: usize) -> Description {
     if frames_of(&description).is_some() {
         return description;
@@ -160,8 +160,8 @@ pub fn frames_of(description: &Description) -> Option<u32> {
     description.axes.iter().find(|axis| axis.role == AxisRole::Frames).map(|axis| axis.dimension)
 }
 
-/// The values of a variable, then those of the same variable of each of `more`, if frames are the slowest axis of all; none
-/// if they cannot follow each other.
+/// Concatenates the values of a variable with those of the same variable in each of `more`. Frames must be its slowest
+/// axis in all of them; `None` if the values cannot be joined.
 fn appended(variable: &Variable, of: &Description, more: &[Description]) -> Option<Values> {
     let mut all = Appender::new(&variable.values);
     let shape = shape_after_time(variable, of)?;

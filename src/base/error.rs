@@ -83,7 +83,7 @@ pub enum Error {
         /// The place and the reason.
         source: wavesplat_format::Error,
     },
-    /// An input changed while it was being read, or since it was read before. Wait until nobody writes it.
+    /// An input changed while it was being read, or since it was read before. Wait until no program writes to it.
     #[error("{}: {what}", path.display())]
     Changed {
         /// The file.

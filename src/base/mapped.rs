@@ -44,7 +44,7 @@ pub(crate) struct State {
     modified: Option<SystemTime>,
     device: u64,
     inode: u64,
-    /// Whether it is that of a file, and not of data that the caller holds.
+    /// Whether this is the state of a file; false for data that the caller holds.
     is_file: bool,
 }
 
@@ -263,8 +263,8 @@ const SIGNAL_STACK: usize = 256 << 10;
 /// For programs. Call once at the start, before other threads start: they inherit the blocked signals.
 #[doc(hidden)]
 pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
-    // SAFETY: both sets are made by `sigemptyset`, `was` is zeroed and filled in by `sigaction`, which changes nothing where
-    // it is given no new action. Only the mask of this thread changes, and that of the thread that waits.
+    // SAFETY: both sets are made by `sigemptyset`, `was` is zeroed and then filled in by `sigaction`, which changes
+    // nothing if it gets no new action. Only the signal masks of this thread and of the waiting thread change.
     unsafe {
         let mut asked: libc::sigset_t = std::mem::zeroed();
         libc::sigemptyset(&raw mut asked);

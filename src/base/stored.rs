@@ -6,7 +6,7 @@ use std::fmt;
 /// The type of a stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StoredType {
-    /// That of a sample.
+    /// A type that samples have too.
     Sample(SampleType),
     /// Signed, of 64 bits.
     I64,

@@ -19,7 +19,7 @@ pub fn read(path: &Path, kind: &str) -> Result<String> {
     of(bytes, kind).map_err(|what| Error::input(path, what))
 }
 
-/// Bytes of which some were written as `%` and two hexadecimal digits. A `%` before anything else stays.
+/// Replaces `%` and two hexadecimal digits by the byte that they stand for. Keeps any other `%`.
 pub(crate) fn percent_decoded(text: &str) -> Vec<u8> {
     let (mut bytes, mut rest) = (Vec::new(), text.as_bytes());
     while let [first, after @ ..] = rest {

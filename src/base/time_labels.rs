@@ -20,7 +20,7 @@ const SECOND_DIGITS: usize = 15;
 pub struct TimeLabels {
     times: Vec<f64>,
     unit: String,
-    /// Decimals that tell frames apart; None if there is nothing to tell apart.
+    /// Decimals needed to distinguish the times of frames; `None` if all times are the same.
     decimals: Option<usize>,
     dates: Option<Dates>,
 }
@@ -34,7 +34,7 @@ struct Dates {
     shown: Shown,
 }
 
-/// What is written of a date.
+/// The parts of a date that are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shown {
     Day,
@@ -76,7 +76,7 @@ impl TimeLabels {
         self.date(frame).or_else(number)
     }
 
-    /// The time of a frame as a number, without digits that do not tell it from its neighbours.
+    /// The time of a frame as a number, with only the digits needed to distinguish it from its neighbours.
     pub fn number(&self, frame: usize) -> Option<String> {
         let time = *self.times.get(frame)?;
         Some(self.decimals.map_or_else(|| decimal::short(time), |decimals| decimal::rounded(time, decimals)))
@@ -116,7 +116,7 @@ impl Dates {
 }
 
 impl Shown {
-    /// The least that tells all of some instants.
+    /// The coarsest format that shows all of these instants exactly.
     fn of(instants: &[i128]) -> Self {
         let are = |length: i128| instants.iter().all(|instant| instant % length == 0);
         let least = |decimals: &usize| are(SECOND / 10_i128.pow(*decimals as u32));
@@ -128,7 +128,8 @@ impl Shown {
     }
 }
 
-/// Decimals that tell the nearest neighbours apart, of those that doubles have; None if all times are the same.
+/// Decimals needed to distinguish the closest neighbours, at most as many as an f64 holds; `None` if all times are the
+/// same.
 fn decimals(times: &[f64]) -> Option<usize> {
     let steps = times.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0);
     let step = steps.min_by(f64::total_cmp).filter(|step| step.is_finite())?;

@@ -53,10 +53,10 @@ pub struct InputArgs {
     /// Bytes before the first sample of each headerless file [default: 0]
     #[arg(long, value_name = "BYTES", help_heading = "Input")]
     pub offset: Option<u64>,
-    /// Array of the files to read
+    /// Name of the array to read
     #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub variable: Option<String>,
-    /// Read the length of a vector: names of the arrays of its components, separated by commas
+    /// Read the length of a vector: the names of its components' arrays, separated by commas
     #[arg(long, value_name = "NAMES", conflicts_with = "variable", value_delimiter = ',', help_heading = "Input")]
     pub magnitude: Vec<String>,
     /// Meaning of the axes of an array in HDF5, NetCDF or Zarr, slowest first: letters of tzyx, c for another axis
@@ -68,7 +68,7 @@ pub struct InputArgs {
     /// World position of the first voxel, instead of that in the files: X,Y,Z
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Input")]
     pub origin: Option<Triple>,
-    /// Times of frames, instead of those in the files: START,STEP, or a text file with one number on each line
+    /// Times of the frames, instead of the times in the files: START,STEP, or a text file with one number on each line
     #[arg(
         long,
         value_name = "FILE|START,STEP",

@@ -17,13 +17,13 @@ use std::time::Duration;
 /// Options for files behind https:// and s3://.
 #[derive(Debug, Clone, Args)]
 pub struct RemoteArgs {
-    /// Folder that keeps what was read of remote files, for later runs; several programs may use it at once
+    /// Folder that caches the data read from remote files, for later runs; several programs may share it
     #[arg(long, value_name = "DIR", help_heading = "Remote files")]
     cache: Option<PathBuf>,
-    /// Largest size of the cache; what was not used for longest is removed first
+    /// Largest size of the cache; the least recently used data are removed first
     #[arg(long, value_name = "SIZE", default_value = "4GiB", help_heading = "Remote files")]
     cache_size: Size,
-    /// How long a server may be silent before a request is repeated; five requests are made
+    /// How long a server may stay silent before a request is retried; a request is sent at most five times
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds, help_heading = "Remote files")]
     timeout: f64,
     #[arg(skip)]
@@ -48,7 +48,7 @@ impl fmt::Debug for KeptOpen {
 }
 
 impl KeptOpen {
-    /// Forgets the file: the next picture is of what the server has then.
+    /// Forgets the file: the next picture reads it from the server again.
     pub(crate) fn forget(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
@@ -82,7 +82,7 @@ impl RemoteArgs {
         Self { open, ..self }
     }
 
-    /// These options as words for another program, as far as they are not the defaults.
+    /// The options that differ from their defaults, as arguments for another program.
     pub(crate) fn words(&self) -> Vec<OsString> {
         let mut words = Vec::new();
         if let Some(folder) = &self.cache {

@@ -41,7 +41,7 @@ pub(super) fn step(text: &str) -> std::result::Result<f64, String> {
 #[cfg(feature = "cli")]
 pub(super) const TIMES: &str = "times";
 
-/// Its value for times from a file: other frames need others.
+/// Its value for times from a file, which other frames cannot reuse.
 #[cfg(feature = "cli")]
 const LIST: &str = "list";
 
@@ -107,7 +107,7 @@ fn time(line: &[u8]) -> std::result::Result<Option<f64>, String> {
 
 #[cfg(feature = "cli")]
 impl InputArgs {
-    /// What is stored of the times that are given.
+    /// The value of the setting for the given times.
     pub(super) fn times_setting(&self) -> Option<String> {
         match (&self.times, self.dt) {
             (Some(TimesSpec::File(_)), _) => Some(LIST.into()),
@@ -116,8 +116,8 @@ impl InputArgs {
         }
     }
 
-    /// Frames that are appended to a file: their times go on in its steps, if it was converted with such. Every
-    /// `every`-th frame of their archive is taken.
+    /// Gives frames that are appended to a file the times that follow in its steps, if it was converted with regular
+    /// times. `source` has every `every`-th frame of its archive.
     pub fn go_on_in_time(
         &self,
         file: &CoefficientFile,

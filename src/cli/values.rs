@@ -184,8 +184,7 @@ impl fmt::Display for FrameRange {
 }
 
 impl FrameRange {
-    /// Whether the range has all frames from number `frames` on, so that an archive of `frames` frames has none of
-    /// them.
+    /// Whether the range is open and begins at `frames`, just after the last frame of an archive of `frames` frames.
     pub fn begins_at_end(&self, frames: usize) -> bool {
         self.end.is_none() && self.start.is_some_and(|start| start == frames as i64)
     }

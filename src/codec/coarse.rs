@@ -1,7 +1,7 @@
 //! Single samples of a block for a first impression, from few of its bytes.
 //!
-//! A level of detail leaves out the level parts that every n-th voxel does not need (eq 32). Coarser ones still are taken
-//! from that. Blocks without a pyramid are decoded whole.
+//! A level of detail skips the level parts that every n-th voxel does not need (eq 32). Larger strides skip some of the
+//! voxels that the coarsest level of detail decodes. Blocks without a pyramid are decoded whole.
 
 use super::WindowCodec;
 use super::decode::Block;
@@ -9,7 +9,8 @@ use crate::base::sample;
 use crate::wavelet;
 use wavesplat_format::{BlockEntry, Reader, Result, Storage};
 
-/// The coarsest level of detail whose nodes are all that the first level part holds: more would save no bytes.
+/// The coarsest level of detail that is used. Its nodes are exactly those of the first level part, so a coarser one
+/// would save no bytes.
 const COARSEST: u32 = 2;
 
 /// The level of detail at which to decode every `stride`-th voxel, a power of two.
@@ -17,9 +18,9 @@ pub(crate) fn level_of(stride: usize) -> u32 {
     stride.trailing_zeros().min(COARSEST)
 }
 
-/// Decodes every `stride`-th voxel along each axis of a block, in some frames of the window: frame after
-/// frame, x fastest; NaN where a sample is missing, or where the block is lost. The codec has the detail of [`level_of`],
-/// or more.
+/// Decodes every `stride`-th voxel along each axis of a block, in some frames of the window: frame after frame, x
+/// fastest; NaN where a sample is missing, or where the block is lost. The codec must have the level of detail of
+/// [`level_of`], or a finer one.
 pub(crate) fn thinned<S: Storage>(
     reader: &Reader<S>,
     codec: &WindowCodec,

@@ -47,7 +47,7 @@ impl DerefMut for PooledCodes {
 pub(crate) enum Codes {
     /// Without a pyramid: `codes[k * voxels + voxel]`.
     Dense(Buffer<i32>),
-    /// With a pyramid: those that are not zero, pass after pass.
+    /// With a pyramid: the nonzero codes, pass after pass.
     Sparse(PooledCodes),
 }
 

@@ -270,7 +270,7 @@ impl Block {
         self.decode(codec, |_, _| {})
     }
 
-    /// Samples whose nodes already have their type.
+    /// Samples in the case that nodes are samples and already have the sample type.
     fn stored_singles(&self, codec: &WindowCodec, values: &[f32]) -> Buffer<u8> {
         let mut out = Buffer::of(4 * values.len());
         for (bytes, value) in out.as_chunks_mut().0.iter_mut().zip(values) {

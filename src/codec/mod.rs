@@ -51,7 +51,7 @@ pub struct WindowCodec {
     pub promise: ErrorBound,
     /// The sample value that means "missing", besides NaN and infinities.
     pub missing_value: Option<f64>,
-    /// The range that extracted samples are kept within: that of the source's samples in the window.
+    /// If set, extracted samples are clamped to this range, the range of the source's samples in the window.
     pub clip: Option<(f64, f64)>,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
@@ -117,13 +117,14 @@ impl WindowCodec {
         size.map(|n| n.div_ceil(1 << self.lod))
     }
 
-    /// The voxels along x, y, z that coding a block takes: its own, and those of following blocks that predict them.
+    /// The voxels along x, y, z that are needed to code a block: its own, and the ones of following blocks that predict
+    /// them.
     pub fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
         let ghosts = self.scheme.pyramid.as_ref().map_or([0; 3], |pyramid| pyramid.ghost_nodes(size));
         std::array::from_fn(|a| size[a] + ghosts[a])
     }
 
-    /// The passes over a block, of which some voxels may not be decoded.
+    /// The passes that decode a block at the codec's level of detail.
     pub(crate) fn passes<'a>(&self, pyramid: &'a Pyramid, size: [usize; 3]) -> PredictionPasses<'a> {
         PredictionPasses::with_detail(pyramid, size, self.basis.coefficients(), self.lod)
     }
@@ -153,10 +154,10 @@ impl WindowCodec {
     }
 }
 
-/// The setting of files whose extracted samples are kept within the extremes of the source.
+/// The setting that marks files whose extracted samples are clamped to the range of the source.
 pub(crate) const CLIP: (&str, &str) = ("clip", "true");
 
-/// Whether extracted samples are kept within the extremes of the source.
+/// Whether extracted samples are clamped to the range of the source.
 fn is_clipped(file: &Metadata) -> bool {
     file.settings.iter().any(|(name, value)| (name.as_str(), value.as_str()) == CLIP)
 }

@@ -7,7 +7,8 @@ use super::field::Field;
 use wavesplat_format::{BlockEntry, EncodedBlock, EncodedPart, PartKind, Pyramid, Reader, Result, Storage};
 
 impl Encoder {
-    /// A block of `size` voxels whose codec is `from`, as a file with `to` packs it: the same scheme but for the packing.
+    /// Repacks a block of `size` voxels from the codec `from` to the codec `to`. The schemes may differ only in their
+    /// packing.
     ///
     /// # Errors
     /// Those of reading the block.

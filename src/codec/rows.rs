@@ -81,8 +81,8 @@ impl Change {
         if largest > 0.0 { largest.next_up() } else { 0.0 }
     }
 
-    /// The statistics of a level part of `count` codes that are not zero, if this is the change from leaving out it and all
-    /// finer ones.
+    /// The statistics of a level part with `count` nonzero codes. `self` must be the change from leaving out this part
+    /// and all finer ones.
     pub(super) fn stats(&self, count: usize) -> PartStats {
         PartStats { count: count as u64, energy: self.energy(), largest: self.largest() }
     }

@@ -1,4 +1,4 @@
-//! The samples of a block, with those around it that predict its own.
+//! The samples of a block and of the neighbouring voxels that predict them.
 
 use super::WindowCodec;
 use crate::base::sample;
@@ -9,7 +9,7 @@ use std::borrow::Cow;
 pub struct SampledBox {
     /// Voxels of the block along x, y, z.
     pub size: [usize; 3],
-    /// Voxels with samples: those of the block, and maybe one more along x, y, z.
+    /// Voxels with samples: the block's own, and possibly one more along each of x, y, z.
     pub known: [usize; 3],
 }
 
@@ -35,8 +35,8 @@ impl SampledBox {
         Cow::Owned(own)
     }
 
-    /// The samples of `outer` voxels along x, y, z, no fewer than are known. Behind those, the last two planes are continued
-    /// in straight lines.
+    /// The samples of `outer` voxels along x, y, z, at least as many as are known. Beyond the known voxels, the last
+    /// two planes are extrapolated linearly.
     pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> Cow<'a, [u8]> {
         let mut known = self.known;
         let mut extended = Cow::Borrowed(samples);
@@ -50,8 +50,8 @@ impl SampledBox {
     }
 }
 
-/// Adds a plane of samples behind the last one along an axis: twice the last less the one before. Beside missing samples
-/// it repeats the last.
+/// Extrapolates one more plane of samples along an axis: twice the last plane minus the one before it. Where one of the
+/// two samples is missing, it repeats the last.
 fn continued(codec: &WindowCodec, samples: &[u8], known: [usize; 3], axis: usize) -> Vec<u8> {
     let (ty, each) = (codec.sample, codec.sample.size());
     let inner: usize = known[..axis].iter().product();

@@ -15,7 +15,7 @@ pub(crate) struct Trial<'a, R> {
     samples: Cow<'a, [u8]>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
-    /// The nodes of the box, and of those behind it that may predict its own.
+    /// The nodes of the box, and the nodes beyond it that may predict them.
     nodes: Vec<R>,
     /// The voxels of these nodes along x, y, z.
     outer: [usize; 3],

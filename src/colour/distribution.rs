@@ -93,9 +93,10 @@ impl Distribution {
         Some(Common { value, ..found }).filter(|found| found.share >= EMPTY)
     }
 
-    /// Opacities over a range, as points (share of the range, opacity): empty space is transparent, or else the most common
-    /// value. The farther from it a value is, in rank and by itself, the more opaque. A path through the volume, `length` times as long as the path
-    /// that has these opacities, stops most light.
+    /// Opacities over a range, as points (share of the range, opacity): empty space is transparent, or else the most
+    /// common value. The farther a value is from it, in rank and in value, the more opaque it is. The opacities are
+    /// scaled so that a path through the volume, `length` times as long as the path that they refer to, stops most
+    /// light.
     pub fn opacities(&self, (lo, hi): (f64, f64), length: f64) -> Vec<(f64, f64)> {
         let Some(common) = self.empty((lo, hi)).or_else(|| self.common((lo, hi))) else {
             return vec![(0.0, 0.0), (1.0, 1.0)];

@@ -12,7 +12,7 @@ pub(super) enum Lookup {
     Nearest(Vec<Rgb>),
 }
 
-/// Number of steps. Of those of the named maps, 2 to 7 % have several colours.
+/// Number of steps. In the named maps, 2 to 7 % of the steps have several colours.
 const STEPS: usize = 1 << 14;
 
 /// Number of steps for slow maps, enough that colours are exact up to rounding.

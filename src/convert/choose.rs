@@ -84,7 +84,7 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) most: usize,
     /// How the file's codes are packed.
     pub(super) packing: Packing,
-    /// The scheme of the window before, if the choice may begin with it.
+    /// The previous window's scheme, if the choice may start from it.
     pub(super) before: Option<&'a Scheme>,
 }
 

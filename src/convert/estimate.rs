@@ -38,8 +38,8 @@ pub struct Estimate {
     pub tolerance: f64,
     /// The error that it allows, in the samples' unit.
     pub error: f64,
-    /// Of the voxels of the coded blocks that change, the share that vary by less than this error (standard deviation over a
-    /// window's frames); none if no voxel changes.
+    /// Share of the changing voxels of the coded blocks whose standard deviation over a window's frames is less than
+    /// this error; `None` if no voxel changes.
     pub lost: Option<f64>,
     /// The value range that it refers to, from a few frames of each coded window and the last frame.
     pub range: (f64, f64),

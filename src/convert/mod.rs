@@ -81,7 +81,8 @@ pub enum MissingPolicy {
 pub struct ConvertConfig {
     /// Restricts the choice of scheme. Default: the smallest is found for every window.
     pub coding: SchemeConstraint,
-    /// Windows in a row of which each may begin with the scheme of the one before. Shards are whole chains. Default: 8.
+    /// Number of consecutive windows that may reuse the previous window's scheme. A shard is a whole number of such
+    /// chains. Default: 8.
     pub chain: usize,
     /// Frames in a window: a power of two for [`Basis::Haar`], one more for [`Basis::Multi`]. Default: 32.
     pub window: usize,
@@ -98,13 +99,13 @@ pub struct ConvertConfig {
     pub missing: MissingPolicy,
     /// A value that means "missing", besides NaN and infinities. Default: none.
     pub missing_value: Option<f64>,
-    /// Refuse a window in which an extreme repeats that probably means "missing", and makes a bound that refers to the value
-    /// range larger than what the other samples hold. Default: true.
+    /// Refuse a window if its largest or smallest value repeats, probably means "missing", and would make a bound that
+    /// refers to the value range larger than the variation of the other samples. Default: true.
     pub refuse_fill: bool,
-    /// Whether extracted samples are kept within the extremes of the window's source samples. Default: no.
+    /// Clamp extracted samples to the smallest and largest source sample of their window. Default: no.
     pub clip: bool,
-    /// Colours that samples are turned into before all else: three channels, 0 to 1, which the bound then refers to. Their
-    /// value range is 0 to 1 by default. Default: none.
+    /// Colours to convert samples to before they are coded: three channels, 0 to 1. The bound then refers to the
+    /// channels, whose value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
     /// Voxels a side of a block. Default: as many as suit the window.
     pub block: Option<usize>,
@@ -112,7 +113,8 @@ pub struct ConvertConfig {
     pub level: i32,
     /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
-    /// What was asked of the input (frames, region, variable), to find the same samples again. Default: nothing.
+    /// Options that selected the input (frames, region, variable), stored so that the same samples can be found again.
+    /// Default: none.
     pub settings: Vec<(String, String)>,
 }
 
@@ -199,10 +201,10 @@ pub struct ConvertReport {
     pub reached: f64,
     /// The largest share of its bound that any series uses.
     pub share: f64,
-    /// How much voxels vary over time: the median standard deviation in a window of the voxels that change, estimated from
-    /// some voxels of every window converted now. None if no voxel changes.
+    /// Typical variation over time: the median, over the voxels that change, of the standard deviation within a window.
+    /// Estimated from some voxels of every window converted now. `None` if no voxel changes.
     pub typical_variation: Option<f64>,
-    /// What is worth knowing, and what to change.
+    /// Warnings, with what to change.
     #[serde(skip)]
     pub warnings: Vec<Note>,
     /// The bound and the errors of each window.
@@ -225,8 +227,7 @@ pub struct ConvertReport {
 pub struct PartialFile {
     /// The file's complete windows.
     pub complete: CompletePrefix,
-    /// The number of the first window whose frames the source still has, from its first frame on. Windows before it are
-    /// not compared with the source.
+    /// Number of the window at which the source begins. Earlier windows are not compared with the source.
     pub first_window: usize,
     /// The description of the windows before it, if there are any and the file has one.
     pub description: Option<Description>,
@@ -283,7 +284,7 @@ pub fn resume<W: Write>(
     Ok(report)
 }
 
-/// An error if what a source says beside its samples does not fit these: better at the start than at the end.
+/// Checks that the source's description fits its frames, so that a mismatch fails at the start and not at the end.
 fn check_description(archive: &Archive, begun: Option<&PartialFile>) -> Result<()> {
     let is_appended = begun.is_some_and(|begun| begun.first_window > 0);
     let fits = |description: &Description| {

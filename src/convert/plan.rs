@@ -99,7 +99,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// An error if the bound is no number that it can be, or means nothing for these samples.
+/// Checks that the tolerance or error is valid for this bound and these samples.
 fn check_bound(config: &ConvertConfig, coloured: bool) -> Result<()> {
     let Some(error) = config.max_error else {
         let is_share = (0.0..=1.0).contains(&config.tolerance);

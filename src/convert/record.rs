@@ -21,7 +21,7 @@ pub(super) struct Recorder<'a, W: Write> {
     /// The file's writer, created when the first window gives the file its id.
     writer: Option<Writer<W>>,
     out: Option<W>,
-    /// What is said beside the samples; none once the file is finished.
+    /// The descriptions to store; empty once the file is finished.
     descriptions: Descriptions,
     /// The sums over the blocks of the current window so far.
     window: Option<WindowEnd>,
@@ -29,7 +29,7 @@ pub(super) struct Recorder<'a, W: Write> {
     busy: Duration,
 }
 
-/// The descriptions of the frames that the file had before and of those that are added.
+/// The description of the frames already in the file, and that of the added frames.
 #[derive(Default)]
 struct Descriptions {
     before: Option<Description>,
@@ -43,7 +43,7 @@ impl Descriptions {
         Self { before, added: archive.description.clone().filter(|_| is_told) }
     }
 
-    /// The description of the whole file, and names of what is not known of all of its frames.
+    /// The description of the whole file, and the names of the variables left out because some frames lack them.
     fn of_all(self, frames: u64) -> (Option<Description>, Vec<String>) {
         let (Some(before), added) = (self.before, self.added.as_ref()) else { return (self.added, Vec::new()) };
         let before = with_frames(before, 1); // if there is no axis of frames, there is one

@@ -1,8 +1,9 @@
 //! Shards: runs of whole windows that are converted apart, perhaps on several machines. Merged (`crate::file::merge`) they
 //! have the bytes of one conversion.
 //!
-//! What a window tells the next must not cross the border of shards. A bound that refers to a range needs the range of the
-//! whole archive ([`ArchiveScan`]), and shards begin where the choice of schemes begins anew ([`super::ConvertConfig::chain`]).
+//! No window may depend on a window of another shard. So a bound that refers to a range needs the range of the whole
+//! archive ([`ArchiveScan`]), and shards begin where the choice of schemes starts afresh
+//! ([`super::ConvertConfig::chain`]).
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
@@ -68,10 +69,9 @@ impl Shard {
 /// Names and values that a file keeps.
 type Settings = Vec<(String, String)>;
 
-/// The frames of a shard, and the settings that say which it is.
+/// The frames of a shard, and the settings that identify it.
 ///
-/// # Errors
-/// A stream, whose number of frames is not known, or fewer frames than that many shards need.
+/// # Errors The source is a stream, so its number of frames is unknown; or it has too few frames for that many shards.
 pub fn sharded(
     source: Box<dyn FrameSource>,
     shard: Shard,
@@ -88,7 +88,7 @@ pub fn sharded(
     Ok((select(source, selection)?, settings.map(|(name, value)| (name.to_string(), value)).into()))
 }
 
-/// What must be known of all frames before some of them are converted.
+/// The facts about all frames that converting a part of them needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ArchiveScan {
@@ -100,7 +100,7 @@ pub struct ArchiveScan {
     sample: String,
     /// Frames of the archive.
     frames: usize,
-    /// The first of the frames that were read, and the one behind the last.
+    /// The frames that were read, as a half-open range.
     read: [usize; 2],
     /// The least and the largest sample; none if all are missing.
     range: Option<(f64, f64)>,
@@ -111,7 +111,7 @@ pub struct ArchiveScan {
 const SCHEMA: u32 = 1;
 
 impl ArchiveScan {
-    /// Reads all frames of an archive, or those of a shard. `declared` stands for a missing sample.
+    /// Scans all frames of an archive, or a shard's share of them. `declared` is the value that means "missing".
     ///
     /// # Errors
     /// A stream, or frames that cannot be read.
@@ -142,10 +142,9 @@ impl ArchiveScan {
         Ok(Self { schema: SCHEMA, dims: grid.dims, sample: sample.to_string(), frames, read, range, missing })
     }
 
-    /// One scan of the scans of all shards, in any order.
+    /// Merges the scans of all shards, given in any order, into one.
     ///
-    /// # Errors
-    /// Scans of different archives, or frames that no scan or several have read; `names` stand for them in messages.
+    /// # Errors The scans are of different archives, leave out frames, or overlap. Messages use the given names.
     pub fn merged(scans: &[(String, Self)]) -> Result<Self> {
         let mut ordered: Vec<_> = scans.iter().collect();
         ordered.sort_by_key(|(_, scan)| scan.read);

@@ -6,8 +6,8 @@ use crate::codec::scheme::Axis;
 /// The axes in the order of an array's strides.
 pub(super) const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::T];
 
-/// The axes, the roughest first, by what predicting along them leaves of the samples of some boxes, `[x, y, z, t]` each, in
-/// units of `delta`. Missing samples are NaN.
+/// Sorts the axes, the roughest first, by the prediction errors along them in some boxes, in units of `delta`. A box is
+/// its samples and its size `[x, y, z, t]`; missing samples are NaN.
 pub(super) fn roughest_first(boxes: impl Iterator<Item = (Vec<f64>, [usize; 4])>, delta: f64) -> [Axis; 4] {
     let mut axes = AXES;
     let mut sums = [(0.0, 0); 4];
@@ -22,8 +22,8 @@ pub(super) fn roughest_first(boxes: impl Iterator<Item = (Vec<f64>, [usize; 4])>
     axes
 }
 
-/// The bits that some nodes take whose neighbours on both sides along an axis predict them (eq 33), and the number of
-/// nodes.
+/// Estimates the bits to code some nodes that are predicted from their neighbours on both sides along an axis (eq 33).
+/// Returns the bits and the number of nodes.
 fn bits_left(values: &[f64], dims: [usize; 4], axis: usize, delta: f64) -> (f64, usize) {
     let [inner, outer] = [&dims[..axis], &dims[axis + 1..]].map(|dims| dims.iter().product::<usize>());
     let (n, odds) = (dims[axis], dims[axis].saturating_sub(1) / 2);

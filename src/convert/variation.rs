@@ -4,13 +4,14 @@ use crate::base::sample::{self, SampleType};
 use crate::base::spread::evenly;
 use crate::codec::sampled_box::SampledBox;
 
-/// Voxels of a window that are looked at, about.
+/// Approximate number of voxels sampled per window.
 const VOXELS: usize = 4096;
-/// Voxels of a block that are looked at, at most.
+/// Largest number of voxels sampled per block.
 const MOST: usize = 64;
 /// Voxels that vary less than this share of the most varied one do not count: they hold rounding errors.
 const STILL: f64 = 1e-6;
-/// The highest bits of a number that tell the bins of a histogram apart: sign, exponent, and four of the fraction.
+/// Low bits of an f64 that the bins of the histogram ignore. A bin is given by the sign, the exponent and four bits of
+/// the fraction.
 const DROPPED: u32 = 48;
 
 /// The standard deviations of voxels over the frames of a window, counted in bins of up to 6 %.

@@ -18,9 +18,9 @@ pub(super) struct Findings {
     pub(super) range: Option<(f64, f64)>,
 }
 
-/// An extreme this many times farther from the others than their range is long decides what the range is.
+/// An extreme dominates the range if its distance from the other samples is more than this many times their range.
 const FAR: f64 = 10.0;
-/// One this much farther leaves nothing of the others.
+/// Beyond this distance, the bound would leave nothing of the other samples.
 const FARTHEST: f64 = 1000.0;
 
 /// One sample in this many is a noticeable share.
@@ -30,12 +30,12 @@ const MANY: u64 = 100;
 pub(super) enum Fill {
     /// It may mean "missing".
     Warn(Note),
-    /// It would make the bound larger than all that the others hold.
+    /// It would make the bound too large for the other samples.
     Refuse(Note),
 }
 
-/// What to say about an extreme of `samples` samples, if it may mean "missing". `allowed` is the error that it allows to
-/// the others, if the bound refers to a range that it is in.
+/// The note on an extreme of `samples` samples, if it may mean "missing". If the bound refers to a range that contains
+/// the extreme, `allowed` is the resulting error allowed to the other samples.
 pub(super) fn fill(extreme: &Extreme, samples: u64, ty: SampleType, allowed: Option<f64>) -> Option<Fill> {
     let Extreme { value, count, others: (lo, hi) } = *extreme;
     let (far, customary) = (extreme.distance(), is_customary(ty, value));

@@ -14,8 +14,8 @@ pub(super) struct Ahead {
 }
 
 impl Ahead {
-    /// Prepares for the next `count` pieces: if they are not all fetched, fetches them, and more as far as they fit. Local
-    /// files need none of this.
+    /// Prepares for decoding the next `count` pieces. If one of them is not fetched yet, fetches them and as many later
+    /// ones as fit. Does nothing for local files.
     pub(super) fn fetch(
         &mut self,
         (file, channel): (&CoefficientFile, usize),

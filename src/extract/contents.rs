@@ -131,8 +131,8 @@ impl Contents {
         Lattice { dims: std::array::from_fn(|_| lengths.next().unwrap_or(1)), first, directions, spacing, space }
     }
 
-    /// The coordinates of an axis of voxels, ascending: those of the source, or those of the lattice. Depths become negative
-    /// heights.
+    /// The ascending coordinates of an axis of voxels, from the source or else from the lattice. Descending
+    /// coordinates, such as depths, are negated.
     pub(super) fn coordinates(&self, axis: usize) -> Vec<f64> {
         let mut own = self.description.as_ref().and_then(|description| coordinates(description, axis));
         if let Some(at) = own.as_mut().filter(|at| at.last() < at.first()) {

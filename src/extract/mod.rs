@@ -147,7 +147,7 @@ pub fn extract_to(
     Ok(report)
 }
 
-/// The amount decoded at a time: some items of the slowest axis, or of one of these some items of the second axis.
+/// The amount decoded at a time: some items of the slowest axis, or one of its items and some items of the second axis.
 struct Pieces {
     /// Items along the two slowest axes.
     items: [usize; 2],

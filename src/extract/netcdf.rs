@@ -54,7 +54,7 @@ struct ClassicVariable {
     ty: NumberType,
     attributes: Vec<Attribute>,
     bytes: u64,
-    /// None of the samples, which are the last variable.
+    /// `None` for the samples, which are the last variable.
     values: Option<Numbers>,
 }
 

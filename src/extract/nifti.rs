@@ -21,7 +21,7 @@ const LONGEST_OF_FIRST: usize = i16::MAX as usize;
 /// Axes that are known to be aligned with something.
 const ALIGNED: i32 = 2;
 
-/// Steps that differ by less than this part are those of the header, but for rounding.
+/// Steps whose relative difference is less than this are equal up to rounding.
 const SAME_STEP: f64 = 1e-5;
 
 /// Whether the samples have their most significant byte first, as in the source.

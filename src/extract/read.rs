@@ -11,7 +11,7 @@ use std::ops::Range;
 /// The samples of a region of some frames: x fastest, then y, z, and time slowest; `frames.len() * region.voxels()` numbers.
 /// Missing samples are NaN. Only the blocks that touch the region are read.
 ///
-/// Files of colours have three channels, of which this reads the first; [`super::extract`] reads any.
+/// Files of colours have three channels. This reads the first; [`super::extract`] reads any.
 ///
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) if the file lacks a frame or voxel, and those of reading a damaged file.

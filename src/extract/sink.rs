@@ -56,7 +56,7 @@ impl Files {
         self.samples[0].parent().filter(|_| self.format == SampleFormat::Pvd)
     }
 
-    /// An error if a file cannot be created, as far as that is known beforehand.
+    /// Checks in advance that the files can be created, as far as that is possible.
     fn check(&self, force: bool) -> Result<()> {
         if let Some(folder) = self.folder().filter(|folder| !folder.is_dir()) {
             self.last.iter().try_for_each(|list| Output::check(list, force))?;

@@ -68,7 +68,7 @@ impl StoreSink {
     }
 }
 
-/// An error if the store cannot be created, as far as that is known beforehand.
+/// Checks in advance that the store can be created, as far as that is possible.
 pub(super) fn check(path: &Path, force: bool) -> Result<()> {
     if !path.exists() {
         return Ok(());

@@ -7,25 +7,26 @@ use rayon::prelude::*;
 use wavesplat_format::{BlockEntry, CompletePrefix, LeafEntry};
 
 impl CoefficientFile {
-    /// Checks every byte of the file that is in no block and no leaf; `found` is told what is wrong.
+    /// Checks every byte of the file outside blocks and leaves. Calls `found` for each problem.
     pub(crate) fn check_structure(&self, found: &mut dyn FnMut(Error)) -> Result<()> {
         self.reader.check_structure(&mut |wrong| found(self.failed(wrong))).map_err(|e| self.failed(e))
     }
 
-    /// Checks every byte of consecutive blocks, the first of which begins at `at`, that is in no part; `found` is told what
-    /// is wrong. Returns where the next block begins.
+    /// Checks every byte outside parts of consecutive blocks; the first block begins at `at`. Calls `found` for each
+    /// problem. Returns where the next block begins.
     pub(crate) fn check_blocks(&self, at: u64, blocks: &[BlockEntry], found: &mut dyn FnMut(Error)) -> Result<u64> {
         let mut found = |wrong| found(self.failed(wrong));
         self.reader.check_blocks(at, blocks, &mut found).map_err(|e| self.failed(e))
     }
 
-    /// Checks the padding behind a leaf; `found` is told if it is wrong.
+    /// Checks the padding behind a leaf. Calls `found` if it is wrong.
     pub(crate) fn check_leaf_end(&self, leaf: &LeafEntry, found: &mut dyn FnMut(Error)) -> Result<()> {
         let mut found = |wrong| found(self.failed(wrong));
         self.reader.check_leaf_end(leaf, &mut found).map_err(|e| self.failed(e))
     }
 
-    /// Compares the checksums of every byte of the file; the first error. Of blocks that are lost there is nothing to check.
+    /// Compares the checksums of every byte of the file, and returns the first error. Lost blocks have nothing to
+    /// check.
     pub fn check_stored(&self) -> Result<()> {
         let mut wrong = None;
         let mut found = |error| wrong = wrong.take().or(Some(error));
@@ -43,7 +44,7 @@ impl CoefficientFile {
         wrong.map_or(Ok(()), Err)
     }
 
-    /// All of its windows, once every byte of them was seen to be whole.
+    /// Checks every byte of all windows, and returns the windows.
     pub(crate) fn whole_windows(&self) -> Result<CompletePrefix> {
         let whole = CompletePrefix::read(self.reader.storage()).map_err(|e| self.failed(e))?;
         match whole.metadata() == self.metadata() {

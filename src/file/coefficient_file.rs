@@ -48,12 +48,13 @@ pub struct CoefficientFile {
 #[derive(Debug, Default)]
 struct Damage {
     blocks: BTreeMap<BlockId, String>,
-    /// Those that were asked for.
+    /// The damaged blocks that were asked for.
     met: Mutex<BTreeSet<BlockId>>,
 }
 
 impl Damage {
-    /// How many blocks that were asked for are, and what is wrong with the first; none if all of them are whole.
+    /// The number of damaged blocks that were asked for, and the problem of the first; `None` if all blocks that were
+    /// asked for are whole.
     fn words(&self) -> Option<String> {
         let met = self.met.lock().unwrap_or_else(PoisonError::into_inner);
         let first = self.blocks.get(met.first()?)?;
@@ -220,14 +221,14 @@ impl CoefficientFile {
         promise::value_range(self.metadata())
     }
 
-    /// The same as far as the source's samples are known to lie within.
+    /// The value range, clamped to the range that shares refer to: decoded samples may exceed the source's.
     #[doc(hidden)]
     pub fn source_range(&self) -> (f64, f64) {
         let ((lo, hi), (least, most)) = (self.value_range(), promise::range_of_shares(self.metadata()));
         if least <= most { (lo.max(least).min(most), hi.min(most).max(least)) } else { (lo, hi) }
     }
 
-    /// Samples or coefficients, whichever are more, of the largest block.
+    /// The number of samples or coefficients, whichever is larger, of the largest block.
     #[doc(hidden)]
     pub fn largest_block(&self) -> usize {
         let windows = &self.metadata().windows;
@@ -235,8 +236,8 @@ impl CoefficientFile {
         self.blocks.region(0).voxels() * longest
     }
 
-    /// Bytes that the largest block takes as it is read and refined: payload, codes, coefficients, what is missing, and
-    /// what is stored exactly.
+    /// Bytes of memory to read and refine the largest block: payload, codes, coefficients, the mask of missing samples,
+    /// and exactly stored samples.
     pub(crate) fn block_bytes(&self) -> usize {
         let payload = 5;
         self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
@@ -253,7 +254,7 @@ impl CoefficientFile {
         w.first_frame as usize..w.first_frame as usize + w.frames as usize
     }
 
-    /// What decoding a window's blocks takes.
+    /// The codec that decodes a window's blocks.
     #[doc(hidden)]
     pub fn codec(&self, window: u32) -> Result<WindowCodec> {
         Ok(WindowCodec { lod: self.lod, ..self.codec_of_all(window)? })
@@ -376,7 +377,7 @@ impl CoefficientFile {
         !self.blocks.region(block as usize).intersect(region).is_empty()
     }
 
-    /// Reads the block of a directory entry, of its coefficients those that `wanted` marks.
+    /// Reads the block of a directory entry; only the coefficients that `wanted` marks.
     #[doc(hidden)]
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
         let size = self.all_voxels(entry)?;
@@ -446,7 +447,8 @@ pub fn time_labels(file: &Metadata) -> TimeLabels {
     TimeLabels::new(file.times.clone(), setting(file, "time-units"), setting(file, "calendar"))
 }
 
-/// What made the channels of a file; an error where it has several, and does not say of what.
+/// The transform from samples to the file's channels; an error if the file has several channels and does not state a
+/// transform.
 fn colour_transform(m: &Metadata) -> std::result::Result<Option<ColourTransform>, wavesplat_format::Error> {
     if m.channels == 1 {
         return Ok(None);

@@ -1,4 +1,5 @@
-//! Parts of a file that are read together: a remote file is told beforehand what will be read, and asks for it at once.
+//! Fetches parts of a remote file together: the ranges that will be read soon are requested in advance, in few
+//! requests.
 
 use super::CoefficientFile;
 use crate::base::error::Result;
@@ -31,7 +32,7 @@ impl Gathered {
         }
     }
 
-    /// Whether there are as many as a remote file keeps.
+    /// Whether the parts fill as many pages as should be fetched together.
     pub(crate) fn is_full(&self) -> bool {
         self.pages.is_full()
     }
@@ -42,7 +43,7 @@ fn bytes_of(part: &PartEntry) -> Range<u64> {
 }
 
 impl CoefficientFile {
-    /// Whether the file is remote: what is read soon should be fetched first.
+    /// Whether the file is remote, so that bytes should be fetched before they are read.
     pub(crate) fn is_remote(&self) -> bool {
         self.reader.storage().is_remote()
     }
@@ -83,7 +84,7 @@ impl CoefficientFile {
         self.fetch(parts.map(bytes_of))
     }
 
-    /// Fetches what of some blocks is needed for the coefficients that `wanted` marks.
+    /// Fetches the parts of some blocks that the coefficients marked by `wanted` need.
     pub(crate) fn fetch_blocks(&self, codec: &WindowCodec, entries: &[BlockEntry], wanted: &[bool]) -> Result<()> {
         self.fetch_parts(entries.iter().flat_map(|entry| Block::parts(codec, entry, wanted)))
     }

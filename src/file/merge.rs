@@ -39,7 +39,7 @@ pub struct MergeReport {
     pub output_bytes: u64,
 }
 
-/// What of a shard stays in memory: the file is opened again when its turn comes.
+/// The part of a shard kept in memory. Its file is reopened when it is merged.
 struct Part {
     path: PathBuf,
     place: Place,
@@ -56,13 +56,14 @@ pub struct Shards {
     /// The digest of the first window; 0 if it is lost.
     first_digest: u64,
     description: Option<Description>,
-    /// How windows are told that are lost, if there are any.
+    /// How to record lost windows, if any.
     lost: Option<LostWindows>,
     /// Shards that cannot be opened.
     unreadable: Vec<PathBuf>,
 }
 
-/// What is known of windows whose shards are missing: their frames, and the range that all windows of shards share.
+/// The facts that are known about the windows of missing shards: their number of frames, and the value range, which all
+/// shards share.
 #[derive(Debug, Clone, Copy)]
 struct LostWindows {
     length: u32,
@@ -98,7 +99,7 @@ impl Shards {
         Ok(Self { unreadable, ..shards })
     }
 
-    /// Opens shards that follow a whole file: those after it, without a gap. [`Self::merge`] goes on with its windows.
+    /// Opens the shards that follow a whole file without a gap. [`Self::merge`] appends their windows to the file's.
     ///
     /// # Errors
     /// As [`Self::open`], or the file is a shard itself.
@@ -212,7 +213,7 @@ struct Opened {
 const MOST_LOST: u64 = 64;
 
 impl Opened {
-    /// How windows are told whose shards are missing; none if there are none.
+    /// How to record the windows of missing shards; `None` if no shard is missing.
     fn lost_windows(&self, all: &[Self]) -> Result<Option<LostWindows>> {
         let held: u64 = all.iter().map(|shard| shard.part.place.frames.end - shard.part.place.frames.start).sum();
         let (path, missing) = (&self.part.path, self.part.place.all.saturating_sub(held));
@@ -385,7 +386,8 @@ impl<W: Write> Merger<'_, W> {
         }
     }
 
-    /// Copies a window of a shard, which gets a number and later frames.
+    /// Copies a window of a shard. In the merged file it has the number `number`, and its first frame is later by
+    /// `frames`, the frames before the shard.
     fn add_window(&mut self, file: &CoefficientFile, window: u32, (number, frames): (usize, u64)) -> Result<()> {
         let number = number as u32;
         let mut record = WindowRecord { number, ..file.metadata().window_record(window) };

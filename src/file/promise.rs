@@ -4,10 +4,10 @@ use super::setting;
 use crate::base::sample::join_ranges;
 use wavesplat_format::{Bound, Metadata};
 
-/// The range that an error in the samples' unit is stored with: `tolerance` times its length is the error itself.
+/// The range stored with a bound in the samples' unit. Its length is 1, so that `tolerance` is the error itself.
 pub(crate) const UNIT_RANGE: (f64, f64) = (0.0, 1.0);
 
-/// The setting that tells an error in the samples' unit from a share of a given range.
+/// The setting that marks a bound in the samples' unit, in contrast to a share of a given range.
 pub(crate) const MAX_ERROR: &str = "max-error";
 
 /// The error that a conversion was asked to keep, in the samples' unit; none if it was asked to keep a share.
@@ -25,7 +25,7 @@ pub(super) fn value_range(file: &Metadata) -> (f64, f64) {
     if range.0 <= range.1 { range } else { (0.0, 0.0) }
 }
 
-/// The range of values that shares refer to: that of the tolerance; of a file with a bound in the samples' unit, that of
+/// The value range that shares refer to: the range of the tolerance, or, for a bound in the samples' unit, the range of
 /// the decoded samples.
 pub fn range_of_shares(file: &Metadata) -> (f64, f64) {
     if max_error(file).is_some() { value_range(file) } else { file.range() }

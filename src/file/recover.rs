@@ -24,11 +24,11 @@ pub struct RecoverReport {
     pub blocks_lost: u64,
     /// Where these are: runs of blocks of a window.
     pub lost: Vec<Run>,
-    /// Windows of it of which nothing said how they were coded: of these all blocks are lost.
+    /// Windows whose coding record is damaged; all their blocks are lost.
     pub windows_undescribed: Vec<u32>,
-    /// Whole blocks that were left behind, since they are of later windows, of which nothing says how they were coded.
+    /// Intact blocks that were not recovered, because they belong to later windows whose coding record is damaged.
     pub blocks_left_behind: u64,
-    /// Whether it is known that there were no more windows than these.
+    /// Whether it is certain that there were no more windows.
     pub all_known: bool,
 }
 
@@ -48,8 +48,8 @@ pub struct Run {
     pub channel: Option<&'static str>,
 }
 
-/// Writes all of `damaged` that is whole to `out`, which `name` stands for in messages. The first progress is that of searching
-/// bytes, the second that of saving blocks.
+/// Writes all intact blocks of `damaged` to `out`, called `name` in messages. The first progress counts the bytes
+/// searched, the second the blocks saved.
 pub fn recover(
     damaged: &FileBytes,
     name: &Path,

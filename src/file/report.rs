@@ -11,7 +11,7 @@ use wavesplat_format::{Metadata, Window};
 pub struct BoundReport {
     /// The kind of bound.
     pub bound: &'static str,
-    /// Whether the tolerance is guaranteed; false where the bound that is kept is itself an estimate.
+    /// Whether the tolerance is guaranteed; false if the bound itself is an estimate.
     pub guaranteed: bool,
     /// As asked for; the same number as `max_error` if that was asked for.
     pub tolerance: f64,
@@ -19,7 +19,7 @@ pub struct BoundReport {
     pub max_error: Option<f64>,
     /// The samples' unit, if it is known.
     pub units: Option<String>,
-    /// Of a relative bound: below this magnitude samples may be as wrong as at it.
+    /// For a relative bound: smaller magnitudes have the same allowed error as this one.
     pub floor: Option<f64>,
     /// Of a sampled bound: pixels on each of three faces.
     pub samples: Option<u32>,
@@ -46,7 +46,7 @@ impl BoundReport {
 }
 
 impl BoundReport {
-    /// What a line that says that the bound is kept must add.
+    /// The caution to add to a line that says that the bound is kept; empty if the bound is guaranteed.
     pub fn caution(&self) -> &'static str {
         if self.guaranteed { "" } else { "; that bound is AN ESTIMATE from pixels, NOT A GUARANTEE for images" }
     }

@@ -1,7 +1,7 @@
-//! Going on with a file: one that a killed run left as `NAME.part`, or a finished one to which windows are added.
+//! Resumes a file that a killed run left as `NAME.part`, or appends windows to a finished file.
 //!
-//! Both are the same: whole windows at the beginning of `NAME.part`, after which writing goes on. Those of a finished file are
-//! copied there first, so that it stays what it is until its successor takes its name.
+//! Both continue after the whole windows at the beginning of `NAME.part`. The windows of a finished file are copied
+//! there first, so that the finished file stays unchanged until its successor takes its name.
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::mapped::{Access, FileBytes};
@@ -17,11 +17,11 @@ use wavesplat_format::{CompletePrefix, Error as FormatError, Window};
 /// What becomes of the whole windows that an earlier run left unfinished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Earlier {
-    /// They are an error: neither lost nor taken for what they may not be.
+    /// They are an error, so that they are neither overwritten nor continued by mistake.
     Refuse,
-    /// They are written over.
+    /// They are overwritten.
     Discard,
-    /// The run goes on after them.
+    /// The run continues after them.
     Resume,
 }
 
@@ -35,7 +35,7 @@ impl Earlier {
         }
     }
 
-    /// What is gone on with of what there is.
+    /// Returns the finished windows to continue from.
     fn of(self, held: Option<CompletePrefix>, part: &Path) -> Result<Option<CompletePrefix>> {
         match (self, held) {
             (Self::Resume, held) => Ok(held),
@@ -48,8 +48,8 @@ impl Earlier {
     }
 }
 
-/// Opens the output of a conversion, and finds what there is to go on with. With `replace` a file of that name is replaced in
-/// the end.
+/// Opens the output file and reads the windows an earlier run finished. With `replace`, a file of that name is replaced
+/// once the output is complete.
 pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<CompletePrefix>)> {
     let mut out = Output::resumable(path, replace)?;
     let Some(part) = out.part() else {
@@ -63,8 +63,8 @@ pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Opt
     Ok((out, held))
 }
 
-/// Opens the successor of a finished file that begins with all of its windows, and finds these, or more where there are more
-/// to go on with.
+/// Opens the successor of a finished file, which begins with all of its windows. Returns the windows to continue from:
+/// the finished file's, or also those that an earlier run appended.
 pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, CompletePrefix)> {
     let (path, own) = (of.path(), of.whole_windows()?);
     let mut out = Output::resumable(path, true)?;
@@ -88,7 +88,7 @@ pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output,
     }
 }
 
-/// Whether the first windows of one are those of the other.
+/// Whether `all` has the id of `first` and begins with its windows.
 fn goes_on(all: &CompletePrefix, first: &CompletePrefix) -> bool {
     all.id() == first.id() && all.metadata().windows.starts_with(&first.metadata().windows)
 }
@@ -105,19 +105,21 @@ fn whole_windows(part: &Path) -> Result<Option<CompletePrefix>> {
     }
 }
 
-/// The program's own last look at what it wrote, before the file gets its name: every checksum.
+/// Checks every checksum of the written file, before it gets its name.
 pub fn check(part: &Path) -> Result<()> {
     CoefficientFile::open_with(part, Access::Read)?.check_stored()
 }
 
-/// Whether a finished file is what a conversion would make of these frames, as far as its settings and their number tell.
+/// Whether a finished file is the result of converting these frames, judged by its settings, the number of frames and
+/// the times.
 pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, archive: &Archive) -> Result<bool> {
     let file = CoefficientFile::open_with(path, Access::Read)?;
     let is_long = archive.frames.is_none_or(|frames| frames == file.frames());
     Ok(is_long && file.metadata().start() == *like && archive.begins_with_times(&file.metadata().times))
 }
 
-/// Whether a file ends with windows of just the frames of `source`, by their digests; not of one that is read only once.
+/// Whether a file ends with windows of exactly the frames of `source`, judged by their digests. False if the source
+/// does not know its number of frames.
 pub fn ends_with(file: &CoefficientFile, source: &mut dyn FrameSource) -> Result<bool> {
     let Some(frames) = source.archive().frames else { return Ok(false) };
     let windows = &file.metadata().windows;

@@ -1,15 +1,15 @@
-//! The place of a file in its archive: of a shard as its settings say it, of any other the whole.
+//! The place of a file in its archive: stated by the settings of a shard; any other file is the whole archive.
 
 use super::CoefficientFile;
 use crate::base::error::{Error, Result};
 use std::ops::Range;
 use wavesplat_format::Metadata;
 
-/// The settings of a shard: which of how many it is, and its frames of how many.
+/// The settings of a shard: its number and the number of shards; its frames and the number of frames of the archive.
 pub(crate) const SHARD: &str = "shard";
 pub(crate) const SHARD_OF: &str = "shard-of";
 
-/// The place of a shard, as its settings say it.
+/// The place of a shard, read from its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) number: usize,

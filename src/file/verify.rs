@@ -133,8 +133,9 @@ impl Comparison {
     }
 }
 
-/// Checks every byte of the file, whatever of it is damaged, and with a source every sample; the source must give the
-/// frames and the region that were converted. `memory` is what may be allocated, if it is enough for one block.
+/// Checks every byte of the file, also after finding damage, and with a source every sample. The source must have the
+/// frames and the region that were converted. `memory` is the number of bytes that may be allocated; at least one block
+/// is decoded at a time.
 pub fn verify(
     file: &CoefficientFile,
     mut source: Option<&mut dyn FrameSource>,
@@ -145,7 +146,7 @@ pub fn verify(
     if let Some(source) = &source {
         same_shape(file, *source)?;
     }
-    // The source's, those that are extracted and those that are splatted, as samples in their type and as numbers.
+    // The samples of the source and the extracted ones, each in their type and as f64, and the splatted values as f64.
     let block_bytes = file.block_bytes() + file.largest_block() * (2 * file.sample().size() + 3 * size_of::<f64>());
     let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
@@ -204,7 +205,7 @@ fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
     Ok(())
 }
 
-/// Decodes a block, whose parts are all checked by that, and compares it if there is a source.
+/// Decodes a block, which checks all its parts, and compares it with the source, if there is one.
 fn check_block(
     file: &CoefficientFile,
     codec: &WindowCodec,
@@ -244,7 +245,7 @@ fn original(
     read_frames(&channel, frames, region, codec.sample)
 }
 
-/// An error if a coefficient is larger than the directory says, on which skipping relies.
+/// Checks that no coefficient is larger than the directory states; skipping of parts relies on this.
 fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
     let largest_of_parts = block.largest(codec);
     for part in &entry.parts {
@@ -259,8 +260,8 @@ fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block,
     Ok(())
 }
 
-/// Compares the samples of a block, `frame * voxels + voxel`, each of which is at `place(frame, voxel)`; and the range of
-/// those that are extracted and not missing.
+/// Compares the samples of a block, in the order `frame * voxels + voxel`; `place(frame, voxel)` is the place of a
+/// sample in messages. Also returns the range of the extracted samples that are not missing.
 fn compare(
     codec: &WindowCodec,
     original: &[u8],

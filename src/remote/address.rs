@@ -11,12 +11,12 @@ use ureq::http::Uri;
 /// How long a signed request may be under way.
 const VALID: Duration = Duration::from_secs(900);
 
-/// Where an object is, and what a request for it says.
+/// Where an object is, and how to request it.
 #[derive(Debug)]
 pub(super) enum Address {
     Http {
         url: String,
-        /// The header that names who asks, if the address does.
+        /// The `Authorization` header, if the address contains a user name.
         authorization: Option<String>,
     },
     S3(Box<S3>),
@@ -65,7 +65,7 @@ impl Address {
         }
     }
 
-    /// Whether answers must be encrypted: nobody is led from an encrypted server to one that is not.
+    /// Whether requests must use HTTPS. Then redirects to plain HTTP are refused.
     pub(super) fn is_encrypted(&self) -> bool {
         self.url().get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:"))
     }

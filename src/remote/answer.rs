@@ -34,12 +34,13 @@ impl Failure {
 }
 
 impl About {
-    /// What tells this version of the object from others; none if the server does not say.
+    /// Identifies this version of the object: the ETag, else the time of modification; `None` if the server sends
+    /// neither.
     pub(super) fn version(&self) -> Option<&str> {
         self.etag.as_deref().or(self.modified.as_deref())
     }
 
-    /// The ETag, if it stands for the very bytes.
+    /// The ETag, if it is a strong one, which identifies the exact bytes.
     pub(super) fn strong_etag(&self) -> Option<&str> {
         self.etag.as_deref().filter(|etag| !etag.starts_with("W/"))
     }
@@ -60,7 +61,7 @@ impl About {
     }
 }
 
-/// An ETag without the sign that the bytes may be packed in several ways.
+/// An ETag without the mark of a weak one.
 fn plain(etag: &str) -> &str {
     etag.strip_prefix("W/").unwrap_or(etag)
 }
@@ -70,8 +71,8 @@ fn changed(how: &str) -> Failure {
     Failure::Final(io::Error::other(ChangedSince(what)))
 }
 
-/// What the head of an answer to a request for a range says, once it is known that the body has these bytes. `known` is what
-/// earlier answers said; at first there is nothing, and the range may reach beyond the end.
+/// Reads the head of the answer to a range request, and checks that it announces the requested bytes. `known` is the
+/// result of earlier answers; it is `None` for the first request, whose range may reach beyond the end.
 ///
 /// # Errors
 /// Every other answer.

@@ -1,7 +1,7 @@
 //! A folder that keeps pages of remote files for later runs. Several processes may use it at once.
 //!
-//! A page is a file of its own, written under another name and renamed, with a checksum: what is damaged or cut is read
-//! from afar again. A file that cannot be kept is no error, since the cache only saves time.
+//! A page is a file of its own, written under another name and renamed, with a checksum: a page that is damaged or cut
+//! short is downloaded again. Failing to write a page is no error, since the cache only saves time.
 
 use super::pages::PAGE;
 use crate::base::error::{Error, Result};
@@ -20,7 +20,7 @@ const PREFIX: &str = "wavesplat-";
 /// The ending of pages.
 const ENDING: &str = "page";
 
-/// Use within this time is not noted.
+/// A page used again within this time keeps its recorded time of use.
 const RECENT: Duration = Duration::from_secs(60);
 
 /// A folder of pages of at most a number of bytes.
@@ -33,7 +33,7 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Bytes that a cache takes where nobody says how many: 4 GiB.
+    /// Default cache size: 4 GiB.
     pub const ROOM: u64 = 4 << 30;
 
     /// A cache in a folder, which is made if it does not exist; of at most `most` bytes.
@@ -49,8 +49,8 @@ impl Cache {
         Ok(cache)
     }
 
-    /// The part of an object that its name, its first bytes, its version and its length tell from all others. The first bytes
-    /// hold the identity of a coefficient file.
+    /// The cache entry of one object, identified by its name, first bytes, version and length. The first bytes hold the
+    /// identity of a coefficient file.
     #[cfg_attr(not(feature = "remote"), allow(dead_code, reason = "only objects of servers have this"))]
     pub(super) fn object(&self, name: &Path, (first, version, len): (&[u8], &str, u64)) -> CachedObject {
         let digests =
@@ -71,7 +71,8 @@ impl Cache {
         }
     }
 
-    /// Removes the pages that were not used for longest, until three quarters of the room are left.
+    /// If the cache is too large, removes the least recently used pages until at most three quarters of its room are
+    /// used.
     fn trim(&self) {
         let mut pages: Vec<(SystemTime, u64, PathBuf)> = self.pages().collect();
         let mut bytes: u64 = pages.iter().map(|(_, bytes, _)| bytes).sum();

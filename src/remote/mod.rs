@@ -1,4 +1,4 @@
-//! Files that are elsewhere: objects behind `https://`, `http://` and `s3://`, read by parts over HTTP.
+//! Remote files: objects behind `https://`, `http://` and `s3://`, read by parts over HTTP.
 //!
 //! [`open`] asks for the first bytes of an object; the answer also tells its length and its version. What is read later comes in
 //! pages (`paged.rs`), many to a request and several requests side by side; pages are kept in memory, and in a folder

@@ -60,7 +60,7 @@ pub(super) struct Object {
     turns: Turns,
 }
 
-/// Lets some requests pass at a time, whatever the number of threads that make them.
+/// Limits the number of simultaneous requests, whatever the number of threads that make them.
 #[derive(Debug)]
 struct Turns {
     free: Mutex<usize>,
@@ -97,7 +97,7 @@ impl Object {
         patiently(ask).map(|(_, bytes)| bytes)
     }
 
-    /// Asks once for a range. `known` is what is known of the object.
+    /// Requests a range once. `known` is the result of earlier answers, if any.
     fn ask(&self, range: &Range<u64>, known: Option<&About>) -> Result<(About, Vec<u8>), Failure> {
         let mut request = self.agent.get(self.address.url());
         request = request.header("Range", format!("bytes={}-{}", range.start, range.end - 1));
@@ -177,7 +177,7 @@ fn side_by_side(
     Ok(all.into_iter().map(|(_, bytes)| bytes).collect())
 }
 
-/// Makes a request until it succeeds, or waiting helps no more.
+/// Retries a request until it succeeds, fails for good, or has been tried five times.
 fn patiently<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
     let mut wait = FIRST_WAIT;
     for _ in 1..TRIES {
@@ -196,7 +196,7 @@ fn patiently<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
     })
 }
 
-/// A number between 1 and 1.5, another one every time: many clients that were refused together do not come back together.
+/// A random factor between 1 and 1.5 for waiting times, so that many clients refused at once do not retry at once.
 fn spread() -> f64 {
     1.0 + RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64 / 2.0
 }
@@ -219,7 +219,7 @@ fn agent(address: &Address, timeout: Duration) -> Agent {
     config.build().into()
 }
 
-/// The bytes of an answer, of which there must be this many.
+/// The body of an answer, which must have `length` bytes.
 fn body_of(body: Body, length: u64) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::with_capacity(length as usize);
     let read = body.into_reader().take(length + 1).read_to_end(&mut bytes);
@@ -234,7 +234,7 @@ fn body_of(body: Body, length: u64) -> Result<Vec<u8>, Failure> {
     }
 }
 
-/// What a request without an answer means.
+/// Classifies the failure of a request that got no answer.
 fn failure(error: ureq::Error) -> Failure {
     match error {
         ureq::Error::Timeout(_) => {

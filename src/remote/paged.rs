@@ -23,14 +23,14 @@ pub(crate) struct PageCount {
 }
 
 impl PageCount {
-    /// Counts the pages of a range that the range before does not end with.
+    /// Counts the pages of a range, except the last page of the range before it.
     pub(crate) fn add(&mut self, range: &Range<u64>) {
         let pages = numbers(range);
         self.pages += pages.clone().count() - usize::from(self.last.is_some_and(|last| pages.contains(&last)));
         self.last = pages.last().or(self.last);
     }
 
-    /// Whether there are as many as are fetched at a time.
+    /// Whether there are as many pages as should be fetched together.
     pub(crate) fn is_full(&self) -> bool {
         self.pages >= AHEAD / 2
     }
@@ -39,14 +39,14 @@ impl PageCount {
 /// Bytes from one place on that are fetched at a time.
 pub(crate) const FETCHED: u64 = AHEAD as u64 * PAGE / 2;
 
-/// A storage that is read in pages. Those read last stay in memory, and on a disk if there is a cache; several threads may
-/// read, and no page comes twice at once.
+/// A storage that is read in pages. The pages read last stay in memory, and on disk if there is a cache. Several
+/// threads may read; no page is read by two threads at once.
 #[derive(Debug)]
 pub(crate) struct Paged<S> {
     storage: S,
     on_disk: Option<CachedObject>,
     pages: Mutex<Pages>,
-    /// Some pages have come, or will not.
+    /// Signals that a thread has finished reading its pages, or has failed.
     arrived: Condvar,
 }
 
@@ -77,7 +77,7 @@ impl Pages {
         Some(held.bytes.clone())
     }
 
-    /// Keeps a page; forgets the quarter of all that was not used for longest if there are too many.
+    /// Keeps a page. If there are too many, drops the least recently used quarter.
     fn keep(&mut self, page: u64, bytes: Page) {
         self.clock += 1;
         self.held.insert(page, Held { bytes, used: self.clock });
@@ -90,7 +90,7 @@ impl Pages {
     }
 }
 
-/// Pages that this thread has promised to read. Dropped, it frees others to read those that did not come.
+/// Pages that this thread is reading. When dropped, it lets other threads read the pages that did not arrive.
 struct Promise<'a, S> {
     to: &'a Paged<S>,
     pages: Vec<u64>,
@@ -118,7 +118,7 @@ impl<S> Paged<S> {
 }
 
 impl<S: Storage> Paged<S> {
-    /// The same storage, whose first bytes were read already: whole pages, or all that there is.
+    /// Keeps the first bytes of the storage, which were read already, as far as they are whole pages.
     #[cfg_attr(not(feature = "remote"), allow(dead_code, reason = "only objects of servers have this"))]
     pub(super) fn begun(self, first: &[u8]) -> Self {
         let pages = cut(&(0..first.len() as u64), first);
@@ -128,7 +128,7 @@ impl<S: Storage> Paged<S> {
         self
     }
 
-    /// The pages of these numbers, whoever reads them.
+    /// Gets the pages of these numbers, whichever thread reads them.
     fn get(&self, wanted: &BTreeSet<u64>) -> io::Result<BTreeMap<u64, Page>> {
         let mut found = BTreeMap::new();
         while found.len() < wanted.len() {
@@ -140,8 +140,8 @@ impl<S: Storage> Paged<S> {
         Ok(found)
     }
 
-    /// Takes the pages that are held, and promises to read those that nobody reads. If others read all that is left, waits for
-    /// some of them.
+    /// Takes the wanted pages that are in memory, and claims those that no thread is reading. If other threads are
+    /// reading all of the rest, waits until some arrive.
     fn promise(&self, wanted: &BTreeSet<u64>, found: &mut BTreeMap<u64, Page>) -> Promise<'_, S> {
         let mut pages = self.lock();
         loop {
@@ -162,7 +162,7 @@ impl<S: Storage> Paged<S> {
         }
     }
 
-    /// Takes a page from the disk; whether it was there.
+    /// Loads a page from the disk cache. Returns false if it is not cached.
     fn load(&self, page: u64, found: &mut BTreeMap<u64, Page>) -> bool {
         let length = place(page, self.storage.len()).count();
         let Some(bytes) = self.on_disk.as_ref().and_then(|disk| disk.load(page, length)) else { return false };

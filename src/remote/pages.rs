@@ -5,10 +5,10 @@ use std::ops::Range;
 /// Bytes of a page. At 10 MB a second they take 3 ms, much less than most servers take to answer.
 pub(super) const PAGE: u64 = 32 << 10;
 
-/// Pages between two others that come with the same request: 64 KiB cost less than one more request.
+/// Largest gap, in pages, that is read along with the pages around it: 64 KiB cost less than one more request.
 const GAP: u64 = 2;
 
-/// Pages of a request, at most: longer runs are cut, so that their pieces come side by side.
+/// Largest number of pages per request. Longer runs are split, so that their pieces are requested in parallel.
 const LONGEST: u64 = 128;
 
 /// The numbers of the pages that hold a range.

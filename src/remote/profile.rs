@@ -19,7 +19,7 @@ const INDIRECT: [&str; 6] =
     ["credential_process", "sso_session", "sso_start_url", "role_arn", "web_identity_token_file", "credential_source"];
 
 impl Profile {
-    /// The profile that the environment tells of.
+    /// The profile that the environment names, with its files.
     ///
     /// # Errors
     /// A named profile that is not there, files that are not understood, and profiles whose credentials are elsewhere.

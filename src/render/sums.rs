@@ -78,7 +78,7 @@ pub fn render_sums(
     Ok(report)
 }
 
-/// The setups of all views of the whole volume, of which the voxels of the region are splatted.
+/// The setups of all views, chosen for the whole volume and clipped to the voxels of the region.
 fn setups_of_part(scene: &dyn Scene, config: &RenderConfig) -> Result<Vec<ViewSetup>> {
     config.check(scene.frames())?;
     let refused =

@@ -40,7 +40,7 @@ pub(super) fn weigh_part<'a>(setup: &'a ViewSetup, budget: &Budget<'_>) -> Resul
     Ok(WeightedView { setup, weights: Weights { size: setup.camera.size, sums, cells, ..Weights::default() } })
 }
 
-/// The weights of a view whose `sums` were added from parts that hold the voxels of `boxes`.
+/// The weights of a view from `sums` that were added over parts. The parts hold the voxels of `boxes`.
 pub(super) fn weights_of_parts(
     setup: &ViewSetup,
     config: &RenderConfig,

@@ -22,7 +22,7 @@ impl Peak {
         Self { next: most.next.max(less.value), ..most }
     }
 
-    /// Adds values times `sign`, the largest of which is `most`. Looks at all of them only if the peak is among them.
+    /// Adds values times `sign`; `most` is the largest product. Looks at every value only if `most` reaches the peak.
     fn add(&mut self, values: &[f64], most: f64, sign: f64) {
         if most >= self.value {
             *self = self.join(Self::of(values, most, sign));
@@ -56,7 +56,7 @@ pub(crate) struct Extreme {
     pub(crate) value: f64,
     /// How often it occurs.
     pub(crate) count: u64,
-    /// The range of all other values, without those at the other end, if that leaves any.
+    /// The range of all other values. It leaves out those at the other end, if any remain without them.
     pub(crate) others: (f64, f64),
 }
 
@@ -76,7 +76,7 @@ impl Ends {
         Self { most: self.most.join(other.most), least: self.least.join(other.least) }
     }
 
-    /// Adds values of this range, none of which is missing.
+    /// Adds values without missing ones; `(lo, hi)` is their range.
     pub(crate) fn add(&mut self, values: &[f64], (lo, hi): (f64, f64)) {
         if lo == hi {
             let of = |value| Peak { value, count: values.len() as u64, next: f64::NEG_INFINITY };

@@ -100,8 +100,8 @@ impl FileHeader {
         Grid { dims: self.shape.dims(), spacing: self.spacing, origin: self.origin }
     }
 
-    /// Whether its frames can follow those of the first file, or of the first array of a file, which messages call
-    /// `name`.
+    /// Checks that its frames can follow those of the first file, or of the first array of a file, which messages call
+    /// `name`. Returns what else does not match.
     ///
     /// # Errors
     /// Frames of another shape, variable or unit of samples or places, or where other values stand for missing samples.
@@ -122,7 +122,7 @@ impl FileHeader {
         Ok(Mismatch { grid: !self.is_placed_as(first), times: is_timed && counts(self) != counts(first) })
     }
 
-    /// Whether voxels are where those of another file are, but for a small part of their distance.
+    /// Whether voxels have the same positions as in another file, up to a small fraction of their spacing.
     fn is_placed_as(&self, other: &Self) -> bool {
         let is_near = |a: f64, b: f64, axis: usize| (a - b).abs() <= SAME_PLACE * other.spacing[axis].abs();
         let is_same = |axis: usize| {

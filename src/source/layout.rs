@@ -102,8 +102,8 @@ impl Layout {
         self
     }
 
-    /// The number of samples before the chosen part of the array, and that part: without the slowest axes with a chosen
-    /// index.
+    /// Drops the slowest axes with a chosen index. Returns the number of samples before the chosen part, and the layout
+    /// of that part.
     pub(super) fn chosen_part(&self) -> (usize, Self) {
         let (mut before, mut rest) = (0, self.clone());
         while let Some(Axis { counts: Counts::Only(index), .. }) = rest.0.first().copied() {
@@ -151,7 +151,7 @@ pub(super) struct Strides {
 }
 
 impl Strides {
-    /// Whether voxels of a frame of these dimensions lie together in the order in which boxes are asked for.
+    /// Whether the voxels of a frame of these dimensions are contiguous, x fastest, then y and z.
     pub(super) fn is_plain(&self, dims: [usize; 3], size: usize) -> bool {
         self.voxel == [size, size * dims[0], size * dims[0] * dims[1]].map(|n| n as i64)
     }

@@ -101,7 +101,7 @@ pub struct OpenOptions {
     pub times: Option<GivenTimes>,
     /// The unit of times, perhaps since a date, instead of that in the files.
     pub time_unit: Option<String>,
-    /// Units and calendar of an earlier archive, onto whose clock times are put where they can be.
+    /// Units and calendar of an earlier archive. Times are converted to them where possible.
     pub clock: Option<Units>,
     /// Whether irregular numbers in the names of frame files are accepted.
     pub allow_gaps: bool,
@@ -273,7 +273,7 @@ impl Archive {
         }
     }
 
-    /// Whether its first frames have just these times.
+    /// Whether its first frames have these times; true if it has no times.
     pub(crate) fn begins_with_times(&self, times: &[f64]) -> bool {
         let own = self.times_of(0..times.len().min(self.frames.unwrap_or(usize::MAX)));
         own.iter().zip(times).all(|(own, time)| own.to_bits() == time.to_bits())

@@ -14,7 +14,7 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 pub(crate) struct Scan {
     /// Range of the samples that are not missing; (inf, -inf) if all are.
     pub(crate) range: (f64, f64),
-    /// How often its ends occur, and what is next to them.
+    /// How often the smallest and the largest value occur, and the next values.
     pub(crate) ends: Ends,
     /// Missing samples.
     pub(crate) missing: u64,

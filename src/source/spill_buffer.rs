@@ -42,7 +42,8 @@ impl Spool {
 }
 
 impl SpillBuffer {
-    /// Room for `bytes`, in memory if it may take so many. `name` stands for what they are of in messages.
+    /// Allocates `bytes`, in memory if at most `memory` are needed, else in a temporary file. Messages call the input
+    /// `name`.
     pub(super) fn new(bytes: usize, memory: usize, name: &Path) -> Result<Self> {
         Self::within(bytes, memory, &mut Spool::default(), name)
     }

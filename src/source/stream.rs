@@ -61,7 +61,7 @@ impl<R: Read> Stream<R> {
         Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader, repeated })
     }
 
-    /// Moves up to `frames` frames, and says how many there were; nobody holds those that are skipped.
+    /// Reads up to `frames` frames into `held`, or skips them without a buffer. Returns the number of frames read.
     fn copy(&mut self, frames: usize, mut held: Option<&mut SpillBuffer>) -> Result<usize> {
         let left = self.archive.frames.map_or(frames, |all| frames.min(all - self.next));
         for done in 0..left {
@@ -176,7 +176,7 @@ impl<R: Read + Send> FrameSource for Stream<R> {
     }
 }
 
-/// What a stream says before its first frame, or the user does.
+/// The properties of a stream, from its first header or from the user's options.
 struct StreamHeader {
     shape: Shape,
     ty: StoredType,

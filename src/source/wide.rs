@@ -1,10 +1,10 @@
-//! Integers of 64 bits as samples, where these are exactly as large.
+//! Converts 64-bit integers to samples that hold them exactly.
 
 use super::packing::Packing;
 use crate::base::sample::{self, SampleType};
 use crate::base::stored::StoredType;
 
-/// A stored integer that its sample cannot be.
+/// A stored integer that does not fit in its sample type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Unfit {
     /// Its place among the integers.
@@ -42,7 +42,8 @@ pub(super) fn narrow(stored: StoredType, bytes: &[u8], out: &mut [u8]) -> Result
     Ok(())
 }
 
-/// Fills `out` with samples (little-endian) of packed integers. Only those that are missing may be rounded.
+/// Fills `out` with the samples (little-endian) of packed integers. An integer that an f64 does not hold exactly is an
+/// error, unless it is missing.
 pub(super) fn unpack(stored: StoredType, packing: &Packing, bytes: &[u8], out: &mut [u8]) -> Result<(), Unfit> {
     let ty = packing.sample(stored.sample());
     for ((index, value), out) in integers(stored, bytes).enumerate().zip(out.chunks_exact_mut(ty.size())) {

@@ -79,7 +79,7 @@ struct Demo {
 
 #[derive(Args)]
 struct GalleryArgs {
-    /// demo, a kind of synthetic archive, or frames as wavesplat convert takes them, in one name each
+    /// Archives, one name each: demo, a kind of synthetic archive, or frames as wavesplat convert takes them
     #[arg(value_name = "ARCHIVE", default_values = gallery::USUAL)]
     archives: Vec<String>,
     /// The folder of gallery.png and the coefficient files
@@ -148,19 +148,20 @@ struct BenchArgs {
 enum OtherBench {
     /// Print file sizes under a hard bound, conversion and decoding times on one core, and the same of other coders
     Size(SizeArgs),
-    /// Print what looser tolerances of pictures leave unread, and the errors: certified, expected, true
+    /// Print how much of a file pictures with looser tolerances leave unread, and their certified, expected and true
+    /// errors
     Layers(LayersArgs),
-    /// Print how much faster views are than by the conventional method, beside what they are to reach
+    /// Print how much faster views are than with the conventional method, beside the targets
     Speed(SpeedArgs),
 }
 
 /// Other coders and renderers.
 #[derive(Args)]
 struct PeerArgs {
-    /// Also measure other programs: the Python that has what tools/peers/requirements.txt names
+    /// Also measure other programs, run by this Python. It needs the packages of tools/peers/requirements.txt
     #[arg(long, value_name = "PYTHON")]
     peers: Option<PathBuf>,
-    /// What Python is to run; views.py is taken from beside it [default: tools/peers/peers.py of the sources]
+    /// Script that Python runs; views.py must be in the same folder [default: tools/peers/peers.py of the sources]
     #[arg(long, value_name = "FILE", requires = "peers")]
     script: Option<PathBuf>,
 }
@@ -177,34 +178,36 @@ struct SpeedArgs {
     /// Archives (t, z, y, x), each one .npy
     #[arg(value_name = "INPUT.npy")]
     inputs: Vec<PathBuf>,
-    /// What archives that are made show, separated by commas [default: smooth,moving,sparse where there are no inputs]
+    /// Kinds of synthetic archives to make, separated by commas [default: smooth,moving,sparse where there are no
+    /// inputs]
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Kind>>,
-    /// Their sizes, separated by commas [default: 128x128x128x32,256x256x256x32,128x128x128x64]
+    /// Sizes of the synthetic archives, separated by commas [default: 128x128x128x32,256x256x256x32,128x128x128x64]
     #[arg(long, value_name = "NXxNYxNZxNT", value_delimiter = ',', value_parser = parse_dims)]
     dims: Option<Vec<[usize; 4]>>,
-    /// Pixels from a voxel to the next, separated by commas
+    /// Pixels from one voxel to the next, separated by commas
     #[arg(long, value_name = "PX", value_delimiter = ',', default_value = "2.3,1", value_parser = parse_tolerance)]
     spacings: Vec<f64>,
     /// Pixels a side of the pictures [default: 512]
     #[arg(long, value_name = "N")]
     size: Option<usize>,
-    /// Shares of the value range, separated by commas; targets are about the first
+    /// Tolerances as shares of the value range, separated by commas; the targets apply to the first
     #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3", value_parser = parse_tolerance)]
     tolerances: Vec<f64>,
     /// Numbers of threads, separated by commas
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2")]
     threads: Vec<usize>,
-    /// Rounds through all measurements; the least time of all is taken [default: 3]
+    /// Number of rounds through all measurements; the shortest time counts [default: 3]
     #[arg(long, value_name = "N")]
     repeats: Option<usize>,
-    /// Small archives and pictures: whether everything works, in seconds
+    /// Use small archives and pictures, to check in seconds that everything works
     #[arg(long)]
     small: bool,
-    /// Compare this build's wavesplat-render with the one in this folder instead: the same pictures by both, in turns
+    /// Instead, compare this build's wavesplat-render with the one in this folder: both draw the same pictures, in
+    /// turns
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["large", "peers", "spacings", "threads"])]
     against: Option<PathBuf>,
-    /// Also look at the memory of converting 4 GiB and 20 GiB, which are written to the folder of results
+    /// Also measure the memory of converting archives of 4 GiB and 20 GiB, which are written to the folder of results
     #[arg(long)]
     large: bool,
     #[command(flatten)]
@@ -247,7 +250,7 @@ struct LayersArgs {
     /// The folder of layers.json and layers.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
-    /// Of pictures, shares of the value range, separated by commas
+    /// Tolerances of pictures as shares of the value range, separated by commas
     #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-3,3e-3,1e-2,3e-2,1e-1,3e-1", value_parser = parse_tolerance)]
     tolerances: Vec<f64>,
     /// The date to write into the results [default: today]
@@ -271,10 +274,10 @@ struct SizeArgs {
     /// Shares of the value range, separated by commas
     #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3,1e-4", value_parser = parse_tolerance)]
     tolerances: Vec<f64>,
-    /// Rounds through all coders; the least time of all is taken
+    /// Number of rounds through all coders; the shortest time counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     repeats: usize,
-    /// Small archives: whether everything works, in seconds
+    /// Use small archives, to check in seconds that everything works
     #[arg(long)]
     small: bool,
     /// The date to write into the results [default: today]

@@ -147,7 +147,7 @@ pub fn difference_colour(value: f64) -> Rgb {
 }
 
 /// |a - b| / scale in [`difference_colour`], as one picture of `width` pixels a row for each `height` rows. A pixel has
-/// `channels` numbers, of which the one that differs most is shown.
+/// `channels` numbers; the one that differs most is shown.
 ///
 /// Where both have the background, NaN, it is black; where only one has it, the difference counts as 1.
 ///

@@ -124,7 +124,8 @@ impl<'a, 'b> Found<'a, 'b> {
         self.codes.ends.push(self.count);
     }
 
-    /// Completes the list; returns the low bits, of which none should be left, and whether all symbols were valid.
+    /// Completes the list. Returns the reader of low bits, which should be at its end, and whether all symbols were
+    /// valid.
     pub(super) fn finish(self) -> (BitReader<'b>, bool) {
         self.codes.places.truncate(self.count);
         self.codes.values.truncate(self.count);

@@ -12,7 +12,7 @@ pub(super) struct Literal<'a> {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Value<'a> {
-    /// What is between the quotes; escapes are left as they are.
+    /// The text between the quotes, with escapes not decoded.
     Text(&'a str),
     Number(u64),
     Truth(bool),

@@ -38,8 +38,8 @@ pub(crate) struct AppendArgs {
     /// Add only these frames of INPUTS: a:b or a:b:step, without b
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     frames: Option<FrameRange>,
-    /// Continue an unfinished earlier run of this command, to the same bytes; do nothing if FILE ends with these frames
-    /// already
+    /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run. Does
+    /// nothing if FILE already ends with these frames
     #[arg(long)]
     resume: bool,
     /// Start over, and discard what an earlier run left unfinished

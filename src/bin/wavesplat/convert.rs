@@ -39,16 +39,17 @@ Examples:
 )]
 pub(crate) struct ConvertArgs {
     /// Frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input; or a coefficient
-    /// file, to pack it as this version does, with the same samples
+    /// file, to repack it in this version's format, with the same samples
     #[arg(required = true)]
     pub(super) inputs: Vec<PathBuf>,
-    /// Coefficient file to write, or - for standard output. With several variables %n stands for the name of each
+    /// Coefficient file to write, or - for standard output. With several variables, %n in the name becomes the
+    /// variable's name
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub(super) output: PathBuf,
     /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
     #[arg(long, help_heading = "Output")]
     force: bool,
-    /// Continue an unfinished earlier run of this command, to the same bytes
+    /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run
     #[arg(long, help_heading = "Output")]
     resume: bool,
     /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit [default: 0.01]
@@ -70,16 +71,16 @@ pub(crate) struct ConvertArgs {
     /// mask with --missing-value, and for files that declare a missing value]
     #[arg(long, value_enum, help_heading = ERROR_BOUND)]
     missing: Option<MissingName>,
-    /// Keep extracted samples within the extremes of the source's samples in their window: what is not negative does not
-    /// come back negative. Pictures do not need it
+    /// Clamp decoded samples to the window's original minimum and maximum, so that non-negative data stay non-negative.
+    /// Pictures from coefficients are not affected
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value = "false", hide_default_value = true, hide_possible_values = true, action = clap::ArgAction::Set, help_heading = ERROR_BOUND)]
     clip: bool,
     /// A value that means "missing"
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     missing_value: Option<f64>,
-    /// For --bound relative: samples smaller than this may have the error of a sample of this size. Choose the
-    /// magnitude below which values do not matter: with 0, zeros must come back as zeros, and values near zero take
-    /// most of the file [default: 0]
+    /// For --bound relative: samples smaller than this may be off by as much as a sample of this size. Choose the
+    /// magnitude below which values do not matter. With 0, zeros are kept exactly, and values near zero take most of
+    /// the file [default: 0]
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     floor: Option<f64>,
     /// For --bound sampled: number of random pixels on each of three faces [default: 300]
@@ -90,20 +91,21 @@ pub(crate) struct ConvertArgs {
     seed: Option<u64>,
     #[command(flatten)]
     select: SelectArgs,
-    /// Convert only the I-th of N runs of whole windows, for wavesplat merge. Needs --scan, --range or --max-error
+    /// Convert only the I-th of N shards, each a run of whole windows; wavesplat merge joins them. Needs --scan,
+    /// --range or --max-error
     #[arg(long, value_name = "I/N", help_heading = SHARDS)]
     shard: Option<Shard>,
-    /// What wavesplat scan found in all frames: the range that the tolerance refers to
+    /// File written by wavesplat scan: the value range of all frames, which the tolerance refers to
     #[arg(long, value_name = "FILE", help_heading = SHARDS)]
     scan: Option<PathBuf>,
-    /// Windows in a row of which each may begin with the coding of the one before; shards are runs of these. Smaller
-    /// numbers allow more shards and take more time
+    /// Number of consecutive windows that may reuse the previous window's coding. A shard is a whole number of such
+    /// chains, so a smaller number allows more shards but converts more slowly
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024), help_heading = SHARDS)]
     chain: u32,
     #[command(flatten)]
     pub(super) input: InputArgs,
-    /// Turn every sample into red, green and blue, 0 to 1, and code these: a colour map's name or a transfer function's
-    /// file. The tolerance is then a share of full brightness
+    /// Convert every sample to a colour first, and store red, green and blue, 0 to 1: a colour map's name or a transfer
+    /// function's file. The tolerance is then a share of full brightness
     #[arg(long, value_name = "F", help_heading = CODING)]
     transfer_function: Option<String>,
     /// Transform along time
@@ -157,7 +159,7 @@ enum BasisName {
     Learned,
     /// No transform along time: samples are predicted in space and time
     Pyramid,
-    /// learned or pyramid, with the variant that makes some boxes of the window smallest
+    /// learned or pyramid, whichever variant makes a few sample boxes of the window smallest
     Auto,
 }
 
@@ -169,7 +171,7 @@ enum SpaceName {
     Linear,
     /// From four neighbours along an axis
     Cubic,
-    /// linear or cubic, whichever makes some boxes smaller
+    /// linear or cubic, whichever makes a few sample boxes smaller
     Auto,
 }
 
@@ -326,7 +328,7 @@ impl ConvertArgs {
         }
     }
 
-    /// Packs a coefficient file anew.
+    /// Rewrites a coefficient file in this version's format.
     fn repack(&self, file: &CoefficientFile) -> Result<()> {
         self.refuse_for_coefficients(file.path())?;
         spare_inputs(&self.inputs, &self.output)?;
@@ -340,7 +342,7 @@ impl ConvertArgs {
         self.common.report(&report, self.output == Path::new(STANDARD))
     }
 
-    /// Options of a conversion would have no effect on a coefficient file.
+    /// An error if an option is given that has no effect on a coefficient file.
     fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
         let given = [
             (self.tolerance.is_some(), "--tolerance"),
@@ -409,7 +411,7 @@ impl ConvertArgs {
         Ok(ConvertConfig { colours: self.colours(source, missing_value)?, max_error, missing, missing_value, ..config })
     }
 
-    /// Options that an error in the samples' unit leaves no meaning.
+    /// An error if an option is given that means nothing beside an error in the samples' unit.
     fn refuse_with_max_error(&self) -> Result<()> {
         let for_samples = matches!(self.bound, BoundName::Pointwise | BoundName::Rms);
         let given = [

@@ -8,7 +8,7 @@ use wavesplat::cli::{CommonArgs, spare_inputs};
 use wavesplat::file::merge::{MergeReport, Shards};
 use wavesplat::file::resume::{self, Earlier};
 
-/// Join shards to one coefficient file
+/// Join shards into one coefficient file
 #[derive(Debug, Args)]
 #[command(
     before_help = "\
@@ -30,10 +30,11 @@ pub(crate) struct MergeArgs {
     /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
     #[arg(long)]
     force: bool,
-    /// Continue an unfinished earlier run of this command, to the same bytes
+    /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run
     #[arg(long)]
     resume: bool,
-    /// Keep the blocks that are whole; damaged ones, and those of missing shards, are lost. Exit code 3 if there are any
+    /// Keep all undamaged blocks, and mark damaged blocks and those of missing shards as lost. Exit code 3 if any are
+    /// lost
     #[arg(long)]
     skip_damaged: bool,
     #[command(flatten)]

@@ -8,7 +8,7 @@ use wavesplat::base::output::Output;
 use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
 use wavesplat::convert::shard::{ArchiveScan, Shard};
 
-/// Find what conversions of shards must know of all frames: the range of values
+/// Find the value range of all frames, which conversions of shards need
 #[derive(Debug, Args)]
 #[command(
     before_help = "\
@@ -31,7 +31,7 @@ pub(crate) struct ScanArgs {
     /// Read only the I-th of N parts of the frames
     #[arg(long, value_name = "I/N", conflicts_with = "merge")]
     shard: Option<Shard>,
-    /// Make one scan of those of all shards
+    /// Combine the scans of all shards into one
     #[arg(long)]
     merge: bool,
     /// Replace an existing file

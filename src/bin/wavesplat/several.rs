@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::InputArgs;
 
-/// What stands for the name of a variable in the name of the output.
+/// The placeholder for a variable's name in the name of the output.
 const NAME: &str = "%n";
 
 /// The word for all variables.
@@ -31,7 +31,7 @@ pub(super) fn commands(args: &ConvertArgs) -> Result<Option<Vec<ConvertArgs>>> {
 
 /// A variable to convert.
 struct Chosen {
-    /// What `--variable` would take; none for the only one of an archive.
+    /// The value of `--variable`; none for the only variable of an archive.
     variable: Option<String>,
     name: String,
 }
@@ -71,7 +71,7 @@ fn only(args: &ConvertArgs, input: &InputArgs) -> Result<Chosen> {
     Ok(Chosen { variable: None, name: source.archive().variable.clone().unwrap_or_else(|| "values".into()) })
 }
 
-/// The output for a variable, whose name has no separators and brackets there.
+/// The output for a variable. In its name, letters, digits, `-` and `.` stay, and all else becomes `_`.
 fn output(args: &ConvertArgs, name: &str) -> Result<PathBuf> {
     let pattern = args.output.to_string_lossy();
     if !pattern.contains(NAME) {

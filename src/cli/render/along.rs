@@ -35,8 +35,8 @@ pub(crate) struct AlongArgs {
     /// Shade a composite by the gradient of the samples, so that it looks solid
     #[arg(long, help_heading = "Along the ray")]
     shade: bool,
-    /// Where the lamp of --shade and of isosurfaces stands: degrees to the right of the viewer and above [default:
-    /// -30,40]
+    /// Direction of the light for --shade and isosurfaces: degrees to the right of the viewer, and degrees above
+    /// [default: -30,40]
     #[arg(long, value_name = "AZ,EL", allow_hyphen_values = true, help_heading = "Along the ray")]
     light: Option<Pair>,
     /// Slices per voxel along the ray, and cells per voxel across it [default: by the kernel and the scale, mostly 2]

@@ -17,8 +17,8 @@ use std::str::FromStr;
 /// Options for what is drawn around the volume.
 #[derive(Debug, Args)]
 pub(crate) struct AnnotationArgs {
-    /// Draw the box of the volume, values along its axes, a colour bar and the time of each frame; or only some of all,
-    /// none, box, axes, triad (arrows along x, y and z), scale (a line of a round length), bar and time
+    /// Draw the box of the volume, values along its axes, a colour bar and the time of each frame; or only the given
+    /// parts: all, none, box, axes, triad (arrows along x, y and z), scale (a line of a round length), bar and time
     #[arg(
         long,
         value_name = "PARTS",
@@ -31,7 +31,7 @@ pub(crate) struct AnnotationArgs {
     /// Draw a title above the volume
     #[arg(long, value_name = "TEXT", help_heading = "Colour")]
     title: Option<String>,
-    /// The words beside the colour bar, instead of the name and the unit of the values
+    /// Label of the colour bar, instead of the name and the unit of the values
     #[arg(long, value_name = "TEXT", help_heading = "Colour")]
     bar_title: Option<String>,
     /// Colours of background and letters

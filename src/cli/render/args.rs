@@ -76,8 +76,8 @@ pub struct Cli {
     /// World point in the middle of the picture [default: the volume's centre]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
     pub(crate) center: Option<Triple>,
-    /// Draw heights this many times as tall: a number, or auto for a factor that is noted where the volume is nearly a
-    /// flat sheet, and else 1
+    /// Draw heights this many times as tall: a number, or auto: more than 1 only if the volume is nearly flat, with a
+    /// note that names the factor
     #[arg(long, value_name = "Z", default_value = "auto", value_parser = parse_exaggeration, help_heading = "View")]
     pub(crate) exaggerate: Exaggeration,
     /// Render only these frames: ranges a:b:step or numbers, separated by commas
@@ -99,23 +99,24 @@ pub struct Cli {
     /// at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
     pub(crate) splat_error: Option<f64>,
-    /// Level of detail: read and splat only every 2^N-th voxel along each axis, with a wider kernel. auto takes as much as
-    /// keeps voxels within a pixel. The picture is that of the coarser lattice; no error bound relates it to the whole one
+    /// Level of detail: read and splat only every 2^N-th voxel along each axis, with a wider kernel. auto takes the
+    /// coarsest level whose voxels are no larger than a pixel. The picture shows the coarser lattice; error bounds do
+    /// not cover the voxels left out
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse_detail, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Kernel")]
     pub(crate) lod: Detail,
-    /// A quick look: twice as fast, with a splat error that is estimated and not bounded
+    /// Quick look: twice as fast, but the splat error is only estimated, not bounded
     #[arg(long, conflicts_with_all = ["splat_error", "error_image"], help_heading = "Kernel")]
     pub(crate) fast: bool,
-    /// Read and splat less: pictures may be off by this share of the value range (emissions: as if samples were). At
-    /// least the file's largest sample error, or see --error
+    /// Read and splat less: pictures may be off by this share of the value range (for emissions: samples may). With
+    /// --error certified, at least the file's largest sample error
     #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = "Error")]
     pub(crate) tolerance: Option<f64>,
     /// Error that --tolerance limits; both are reported
     #[arg(long, value_enum, default_value = "certified", help_heading = "Error")]
     pub(crate) error: ErrorName,
-    /// Also write pictures of the certified error: no pixel is further than this from the picture of the source's
-    /// samples, splatted without a cut (a file or pattern like -o; .npy in units of --quantity, colours from 0 to the
-    /// largest error of small pictures)
+    /// Also write pictures of the certified error: an upper bound, per pixel, on the difference from a picture of the
+    /// original samples drawn with the uncut kernel (a file or pattern like -o; .npy in units of --quantity, colours
+    /// from 0 to the largest error of small pictures)
     #[arg(long, value_name = "OUT", help_heading = "Error")]
     pub(crate) error_image: Option<PathBuf>,
     /// Quantity that a pixel shows

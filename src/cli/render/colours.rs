@@ -22,8 +22,8 @@ pub(crate) struct ColourArgs {
     /// Map values to colours linearly, or by their logarithm (down to a ten-thousandth of the largest)
     #[arg(long, value_enum, default_value = "linear", help_heading = "Colour")]
     norm: NormName,
-    /// Values of means and largest values that show the background, as LO,HI, auto or none. auto takes the least
-    /// value, or 0, if many pixels of small pictures are near it
+    /// For means and largest values: the range of values that show the background, as LO,HI, auto or none. auto takes
+    /// the least value, or 0, if many pixels of small pictures are near it
     #[arg(long, value_name = "LO,HI", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     clear: ClearSpec,
     /// Background colour, like ffffff [default: that of the theme]

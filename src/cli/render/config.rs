@@ -21,7 +21,8 @@ fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
     views.iter().map(fixed).collect()
 }
 
-/// A mode whose opacities apply over the largest spacing of all voxels, whatever the level of detail.
+/// The mode with opacities that apply over the largest spacing of `whole`, the lattice of all voxels, whatever the
+/// level of detail.
 fn of_whole(mode: Mode, whole: &Grid) -> Mode {
     match mode {
         Mode::Composite { transfer, unit: None, slices, light, planes } => {
@@ -82,7 +83,7 @@ impl Cli {
         self.frames.as_ref().map_or(Ok((0..all).collect()), |frames| frames.resolve(all))
     }
 
-    /// The voxels to render, of those that a level of detail has.
+    /// The voxels to render, on the lattice of a level of detail.
     fn region_of(&self, whole: &Grid, lod: u32) -> Result<Option<Region>> {
         let Some(region) = self.region.map(|r| r.resolve(whole)).transpose()? else { return Ok(None) };
         let region = region.every(1 << lod);

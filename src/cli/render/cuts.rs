@@ -15,10 +15,10 @@ use std::str::FromStr;
 /// Options for slices.
 #[derive(Debug, Args)]
 pub(crate) struct CutArgs {
-    /// Show the samples on a plane across an axis, alone or within --mode composite; repeat it, or put commas between, for more planes. AXIS is x, y, z or
-    /// the data's own name, like lat. PLACE is a share like 0.3 (with a point, 0.0 to 1.0) or 30%, a voxel like #12, or
-    /// else a coordinate like 45, -500 or 120m; @0.3 is always a coordinate. One slice is seen face-on unless there is
-    /// a --view
+    /// Show the samples on a plane across an axis, alone or within --mode composite. For more planes, repeat the option
+    /// or separate them with commas. AXIS is x, y, z or the data's own name, like lat. PLACE is a share like 0.3 (with
+    /// a point, 0.0 to 1.0) or 30%, a voxel like #12, or else a coordinate like 45, -500 or 120m; @0.3 is always a
+    /// coordinate. A single slice is seen face-on unless --view is given
     #[arg(
         long = "slice",
         value_name = "AXIS=PLACE",

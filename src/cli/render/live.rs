@@ -30,7 +30,7 @@ pub struct Scenery {
     pub(crate) open: KeptOpen,
 }
 
-/// What a page is told before it asks for pictures.
+/// The facts about the scene that a page gets before it asks for pictures.
 #[derive(Debug, Serialize)]
 struct Facts {
     live: bool,
@@ -56,19 +56,19 @@ struct Facts {
     maps: BTreeMap<String, String>,
 }
 
-/// What stands before the blocks of an answer.
+/// The head of an answer, which comes before its blocks.
 #[derive(Serialize)]
 struct Answer<'a> {
     about: &'a page::About,
-    /// The blocks behind this, and their lengths in bytes.
+    /// The blocks that follow, and their lengths in bytes.
     blocks: Vec<(Place, usize)>,
-    /// The largest error of each pixel, as one more block of this many bytes behind the others.
+    /// Bytes of one more block after the others, with the largest error of each pixel.
     errors: Option<usize>,
     /// The opacities of a composite, at shares of its range.
     opacity: Option<Vec<(f64, f64)>>,
 }
 
-/// How common values are.
+/// A histogram of values.
 #[derive(Debug, Serialize)]
 pub struct Histogram {
     /// The least and the largest value.
@@ -102,7 +102,7 @@ impl Scenery {
         page::live(nonce, facts).map_err(|e| Error::io(Path::new("page"), "writing", e))
     }
 
-    /// What the page is told about the scene, as JSON.
+    /// The facts about the scene for the page, as JSON.
     pub fn facts(&self) -> Result<String> {
         serde_json::to_string(&self.known()?).map_err(|e| Error::usage(e.to_string()))
     }

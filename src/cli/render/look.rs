@@ -1,4 +1,4 @@
-//! What a viewer wants to see, as the options of `wavesplat-render`.
+//! A request of the viewer, and the options of `wavesplat-render` that draw it.
 
 use crate::base::error::{Error, Result};
 use crate::colour::NAMES;
@@ -9,7 +9,7 @@ const MOST_PIXELS: usize = 4096;
 const MOST_FRAMES: usize = 4096;
 const MOST_PLACES: usize = 16;
 
-/// A picture that is wanted. It holds numbers and known names alone: a request never names a file.
+/// A request for pictures. It holds only numbers and known names, and never names a file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Look {
@@ -25,7 +25,7 @@ pub struct Look {
     /// The level of detail: every 2^lod-th voxel.
     #[serde(default)]
     lod: u32,
-    /// The first frame, and the one behind the last.
+    /// The first frame, and the end (exclusive).
     frames: [usize; 2],
     /// The values of the first and the last colour.
     range: Option<[f64; 2]>,

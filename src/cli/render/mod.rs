@@ -63,7 +63,7 @@ struct Prepared {
     annotation: Annotation,
 }
 
-/// Does what words after `wavesplat-render` ask for, in a program that has threads, progress and messages of its own.
+/// Runs `wavesplat-render` with these arguments within a program that has its own threads, progress and messages.
 ///
 /// # Errors
 /// Those of the program; [`Error::Usage`](crate::Error::Usage) names its options.
@@ -71,7 +71,7 @@ pub fn run_within(words: impl IntoIterator<Item = OsString>, progress: &dyn Prog
     parsed(words)?.work(Some(progress))
 }
 
-/// What words after `wavesplat-render` ask for; it prints no notes.
+/// Parses the arguments of `wavesplat-render`, with `--quiet` added.
 fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Cli> {
     let first_line = |text: &str| text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_string();
     let words = ["wavesplat-render", "--quiet"].map(OsString::from).into_iter().chain(words);

@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 /// Options for the camera over time, and for the speed of movies.
 #[derive(Debug, Args)]
 pub(crate) struct MotionArgs {
-    /// Turn while time passes: the views of --orbit, or several --view, share the frames, one picture for each view
+    /// Turn the camera while time passes: one picture for each view of --orbit or --view, with the frames spread over
+    /// the views
     #[arg(long, help_heading = "View")]
     pub(crate) over_time: bool,
     /// Move the camera from frame to frame, along a CSV file with the columns frame,azimuth,elevation and perhaps zoom;
@@ -21,7 +22,7 @@ pub(crate) struct MotionArgs {
     /// Frames per second of a movie, y4m or apng
     #[arg(long, value_name = "N", default_value_t = 25.0, value_parser = parse_fps, help_heading = "Output")]
     fps: f64,
-    /// Time of the data that passes in a second of a movie, in the unit of its times; sets --fps
+    /// Time of the data per second of a movie, in the unit of the data's times; sets --fps
     #[arg(long, value_name = "TIME", conflicts_with = "fps", value_parser = parse_speed, help_heading = "Output")]
     speed: Option<f64>,
 }

@@ -25,12 +25,12 @@ use serde::Serialize;
 /// Options for pictures in parts.
 #[derive(Debug, Args)]
 pub(crate) struct PartArgs {
-    /// Write what the voxels of --region, or the frames of a shard, add to the pictures instead of pictures: a file for --sum.
-    /// The volume is framed and splatted as a whole. Projections only
+    /// Instead of pictures, write a file for --sum: the sums over the voxels of --region, or over the frames of a
+    /// shard. Framing and splatting are those of the whole volume. Projections only
     #[arg(long, conflicts_with_all = conflicts::of_sums(), help_heading = "Parts")]
     pub(crate) partial: bool,
-    /// Add files of --partial and make pictures of the sums; with --partial, make one file of them. --annotate and --title
-    /// must be given to the parts too, since they move the volume aside
+    /// Add the files that --partial wrote, and make pictures of the sums; with --partial, write one file of the sums.
+    /// Give --annotate and --title to the parts too, since they move the volume aside
     #[arg(long, conflicts_with_all = conflicts::of_parts(), help_heading = "Parts")]
     pub(crate) sum: bool,
 }
@@ -40,7 +40,7 @@ pub(crate) struct PartArgs {
 struct PartReport<'a> {
     #[serde(flatten)]
     report: &'a RenderReport,
-    /// The voxels of the part: their first, and the one behind their last, along x, y, z.
+    /// The voxels of the part: the first, and the end (exclusive), along x, y, z.
     voxels: Region,
     /// The frames of the part, as the archive numbers them.
     frame_numbers: &'a [usize],
@@ -57,11 +57,11 @@ struct SumReport<'a> {
     of: Summed,
 }
 
-/// What a sum is of.
+/// The parts that make up a sum.
 #[derive(Serialize)]
 struct Summed {
     parts: usize,
-    /// The share of the lattice whose voxels the parts have.
+    /// The share of the lattice's voxels that the parts have.
     covered: f64,
 }
 
@@ -97,7 +97,7 @@ impl Cli {
         Ok(())
     }
 
-    /// Whether the run has to do with parts.
+    /// Whether the run writes or adds parts.
     pub(crate) fn is_of_parts(&self) -> bool {
         self.parts.partial || self.parts.sum
     }
@@ -165,7 +165,7 @@ impl Cli {
         Err(Error::usage(format!("--partial: {what}; {instead}")))
     }
 
-    /// What the part shares with others, and its own share of the work.
+    /// Plans a part: the settings that all parts share, and its own views, frames and voxels.
     fn plan_part(
         &self,
         scene: &dyn Scene,
@@ -227,7 +227,7 @@ impl Cli {
         total.damage().map_or(Ok(()), lacks)
     }
 
-    /// Says what the parts lack.
+    /// Notes which voxels and frames the parts lack.
     fn note_gaps(&self, total: &Total) {
         if !total.is_whole() {
             let percent = 100.0 * total.covered();
@@ -320,7 +320,7 @@ fn whole_voxels(total: &Total) -> Region {
     Region { start: start.map(|n| n * step), end: [0, 1, 2].map(last) }
 }
 
-/// Adds what the parts say of themselves.
+/// Adds the settings stored in the parts.
 fn of_parts(provenance: Provenance, total: &Total) -> Provenance {
     let (look, sources) = (total.look(), total.sources());
     Provenance {

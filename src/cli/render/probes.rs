@@ -23,9 +23,9 @@ use std::str::FromStr;
 /// Options for time series.
 #[derive(Debug, Args)]
 pub(crate) struct ProbeArgs {
-    /// Write the time series of a point instead of pictures, to a .csv or .svg file, or as csv to -; repeat it for more
-    /// points. X, Y and Z are places as in --slice: shares like 0.5, voxels like #12, or coordinates like 45 or 120m.
-    /// Values between voxels are interpolated linearly
+    /// Write the time series of a point instead of pictures, to a .csv or .svg file, or as csv to -; repeat the option
+    /// for more points. X, Y and Z are places as in --slice: shares like 0.5, voxels like #12, or coordinates like 45
+    /// or 120m. Values between voxels are interpolated linearly
     #[arg(
         long = "probe",
         value_name = "X,Y,Z",
@@ -66,13 +66,13 @@ enum Format {
     Svg,
 }
 
-/// What is read of each frame.
+/// What to read from each frame.
 enum Probe {
     Point(Taps),
     Region(Region),
 }
 
-/// One number of each frame.
+/// One number per frame.
 struct Series {
     name: String,
     values: Vec<f64>,

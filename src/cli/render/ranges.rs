@@ -28,8 +28,8 @@ const SIGMA: f64 = 0.5;
 /// The splat error of small pictures; it is small compared with what they leave out.
 const SPLAT_ERROR: f64 = 0.02;
 
-/// The number of frames in which to look for a range, and the number of samples up to which there are more than the
-/// least.
+/// A range is taken from at least `LEAST_FRAMES` frames, and from up to `MOST_FRAMES` as long as these have no more
+/// than `MOST_SAMPLES` samples.
 const LEAST_FRAMES: usize = 4;
 const MOST_FRAMES: usize = 16;
 const MOST_SAMPLES: usize = 5 << 20;
@@ -37,7 +37,7 @@ const MOST_SAMPLES: usize = 5 << 20;
 /// The largest number of views to look at.
 const MOST_VIEWS: usize = 16;
 
-/// Bytes of memory for each sample of an overview: it takes at most a quarter.
+/// Bytes of the memory budget for each sample of an overview, which then takes at most a quarter of the budget.
 const MEMORY_SHARE: usize = 32;
 
 /// The largest number of samples of a distribution.

@@ -73,7 +73,7 @@ impl Cli {
         Ok(Opened { scene, file: Some(file), exaggeration, annotation, colours, axes })
     }
 
-    /// The factor by which heights are drawn taller, with a note if nobody asked for it.
+    /// The factor by which heights are drawn taller, with a note if it was chosen automatically.
     fn exaggeration(&self, grid: &Grid) -> f64 {
         if let Exaggeration::Factor(factor) = self.exaggerate {
             return factor;

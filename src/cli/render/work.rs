@@ -1,4 +1,4 @@
-//! Work that a page waits for: how far it is, and whether the page still wants it.
+//! Work that a page waits for: its progress, and whether it was cancelled.
 
 use crate::base::progress::Progress;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -22,7 +22,7 @@ impl Work {
         (self.done.load(Ordering::Relaxed), self.steps.load(Ordering::Relaxed))
     }
 
-    /// How much of the work is done, 0 to 1, as far as that is known.
+    /// The share of the work that is done, 0 to 1; 0 if the number of steps is not known.
     pub fn share(&self) -> f64 {
         let (done, steps) = self.counts();
         if steps > 0 { (done as f64 / steps as f64).min(1.0) } else { 0.0 }

@@ -4,7 +4,7 @@ use crate::base::error::{Error, Result};
 use axum::http::{HeaderMap, HeaderValue, header};
 use std::net::SocketAddr;
 
-/// A word that nobody can guess.
+/// A random word of 128 bits.
 pub(super) fn token() -> Result<String> {
     let mut bytes = [0; 16];
     getrandom::fill(&mut bytes).map_err(|e| Error::usage(format!("no random numbers for the address: {e}")))?;
@@ -24,8 +24,8 @@ pub(super) fn chosen_token(environment: Option<String>) -> Result<String> {
     Err(Error::usage(format!("{TOKEN}: takes 16 or more letters, digits, - and _")))
 }
 
-/// Whether a request comes from the page of this server. A host with a name could be another site's, whose name leads
-/// here; a foreign origin is another site's page.
+/// Whether a request comes from the page of this server. A host name other than localhost could belong to another site
+/// that resolves to this address; a foreign origin is another site's page.
 pub(super) fn is_own(headers: &HeaderMap) -> bool {
     let text = |name| headers.get(name).map(HeaderValue::to_str);
     let Some(Ok(host)) = text(header::HOST) else { return false };
@@ -38,7 +38,7 @@ pub(super) fn is_own(headers: &HeaderMap) -> bool {
     (is_plain || is_local) && is_same
 }
 
-/// What browsers may do with answers: show them in a page of their own, and nothing else.
+/// Headers that allow browsers to show answers in a page of their own, and nothing else.
 pub(super) const HEADERS: [(&str, &str); 5] = [
     ("cache-control", "no-store"),
     ("content-security-policy", "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"),

@@ -18,8 +18,8 @@ use std::{io, thread};
 /// Look around in a browser: turn, zoom, play, choose colours
 ///
 /// Prints the address of a page, and opens it. The page shows means, largest values, composites, isosurfaces and slices,
-/// and gives the wavesplat-render command of what it shows. Ctrl-C ends it. The environment variable WAVESPLAT_TOKEN sets
-/// the last part of the address, which is else new every time.
+/// and gives the wavesplat-render command of what it shows. Ctrl-C ends it. Set WAVESPLAT_TOKEN to fix the last part of
+/// the address; otherwise it is random.
 #[derive(Debug, Args)]
 #[command(before_help = "\
 Examples:
@@ -37,7 +37,7 @@ pub struct ViewArgs {
     /// Only print the address
     #[arg(long)]
     no_open: bool,
-    /// Address to listen at. Others than the default let other machines look, if they know the whole address
+    /// Address to listen at. Any other than the default lets other machines connect, if they know the whole address
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     listen: IpAddr,
     /// Options of wavesplat-render for all pictures

@@ -35,12 +35,12 @@ const PAUSE: Duration = Duration::from_millis(100);
 /// What all requests share.
 pub(super) struct Server {
     scenery: Arc<Scenery>,
-    /// What the page is told about the scene, as JSON.
+    /// The facts about the scene for the page, as JSON.
     facts: String,
     token: String,
     /// One request renders at a time, with all threads.
     renders: Arc<Semaphore>,
-    /// What is rendered now, or was last.
+    /// The current work, or the last one.
     work: Mutex<Arc<Work>>,
     requests: Semaphore,
 }
@@ -57,7 +57,7 @@ impl Stop {
 
 type Shared = State<Arc<Server>>;
 
-/// Cancels work when nobody waits for it any more.
+/// Cancels work when it is dropped, such as when the client disconnects.
 struct Wait(Arc<Work>);
 
 impl Drop for Wait {
@@ -81,7 +81,7 @@ impl Server {
         Self { scenery: Arc::new(scenery), facts, token, renders, work: Mutex::default(), requests }
     }
 
-    /// Answers requests until somebody stops it.
+    /// Answers requests until `stop` is called.
     pub(super) fn run(self, listener: TcpListener, stop: &Stop) -> io::Result<()> {
         listener.set_nonblocking(true)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -108,7 +108,7 @@ impl Server {
         pages.with_state(shared).layer(admitted)
     }
 
-    /// Does work that renders, after the work before it. If the asker goes away, it ends soon.
+    /// Renders, after earlier work has ended. The work ends soon if the client disconnects.
     async fn render<T: Send + 'static>(
         &self,
         work: impl FnOnce(&Scenery, &Work) -> Result<T> + Send + 'static,
@@ -151,7 +151,7 @@ async fn serve(listener: tokio::net::TcpListener, router: Router) -> io::Result<
     Ok(())
 }
 
-/// Lets requests in that come from the server's own page, and not too many.
+/// Admits requests from the server's own page, at most [`MOST_REQUESTS`] at a time.
 async fn admit(State(server): Shared, request: Request, next: Next) -> Response {
     let mut answer = match server.requests.try_acquire() {
         _ if !guard::is_own(request.headers()) => StatusCode::FORBIDDEN.into_response(),
@@ -198,7 +198,7 @@ async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Vec<u
     server.render(move |scenery, _| scenery.series(point)).await
 }
 
-/// How common samples are, of all frames or of the one that is asked for.
+/// The histogram of the samples of some frames, or of the requested frame.
 async fn histogram(
     State(server): Shared,
     Query(query): Query<HashMap<String, String>>,
@@ -233,7 +233,7 @@ fn look(body: &[u8]) -> std::result::Result<Look, Failed> {
     Look::read(body).map_err(|e| Failed(StatusCode::BAD_REQUEST, e.to_string()))
 }
 
-/// The kind of file that is asked for.
+/// The kind of the requested file.
 fn saved(query: &HashMap<String, String>) -> std::result::Result<Saved, Failed> {
     let known = query.get("file").and_then(|name| Saved::named(name));
     known.ok_or_else(|| Failed(StatusCode::BAD_REQUEST, "file: picture.png, page.html or movie.mp4".into()))

@@ -9,7 +9,7 @@ pub(super) trait Correction<R> {
     /// Corrects consecutive nodes that a pass adds, from number `first` of them on.
     fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]);
 
-    /// Completes a slice of the lattice after a pass: the `slice`-th of those that it adds nodes to.
+    /// Completes the `slice`-th of the slices that a pass adds nodes to.
     fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]);
 }
 

@@ -7,8 +7,8 @@ use wavesplat_format::{Axis, CodeBox, Pass, PassBox, Pyramid, SparseCodes};
 impl<'a> PredictionPasses<'a> {
     /// The passes over every 2^lod-th node along the axes x, y and z, and over all along k, of a block.
     ///
-    /// Of the passes in space, those of finer levels add none of them, but the finest drop what only predicts. Passes along
-    /// time add some in every level.
+    /// Passes in space of finer levels than `lod` add no such nodes. The finest of these are still needed, because they
+    /// drop the nodes that only predict. Passes along time add such nodes in every level.
     pub(crate) fn with_detail(pyramid: &'a Pyramid, size: [usize; 3], k: usize, lod: u32) -> Self {
         let whole = Self::new(pyramid, size, k);
         if lod == 0 {
@@ -39,7 +39,7 @@ impl<'a> PredictionPasses<'a> {
         new
     }
 
-    /// A box of all nodes, as it is read for these.
+    /// The part of a code box of the whole block that this level of detail reads.
     fn thinned(&self, whole: &Self, of: &PassBox, lod: u32) -> PlacedBox {
         let (pass, part) = (whole.passes[of.pass], of.part);
         let mut at = CodeBox { allowed: of.allowed, ..CodeBox::contiguous(of.extents(whole.extent(of.pass))) };
@@ -89,7 +89,7 @@ fn has_nodes(pass: &Pass, lod: u32) -> bool {
     pass.level >= lod || pass.axis.is_none_or(|axis| axis == Axis::T)
 }
 
-/// Whether a pass is kept for these nodes: it adds some, or drops those that only predict.
+/// Whether the level of detail needs a pass: because it adds nodes, or because it drops nodes that only predict.
 fn is_kept(pass: &Pass, lod: u32) -> bool {
     has_nodes(pass, lod) || pass.level == 0
 }

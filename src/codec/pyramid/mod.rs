@@ -63,7 +63,7 @@ pub(crate) struct PredictionPasses<'a> {
 /// A box of codes, and what becomes of them.
 #[derive(Debug)]
 struct PlacedBox {
-    /// The pass that adds its nodes, and which of the pass's; none if the level of detail has none of them.
+    /// The pass that adds its nodes, and the selection of nodes; `None` if the level of detail has none of its nodes.
     of: Option<PassBox>,
     part: u8,
     /// Where its codes lie in the slices of the pass.
@@ -185,9 +185,9 @@ impl<'a> PredictionPasses<'a> {
         Ok(codes)
     }
 
-    /// Decodes codes to the field, of every k that `wanted` marks; `codes` are all codes of the block, as
-    /// [`Self::placed_boxes`] places them. Returns for each k whether some node is not zero; where k is refined, true for
-    /// all or none. The nodes of others are 0 or unspecified.
+    /// Decodes every k that `wanted` marks into the field. `codes` are all codes of the block, as
+    /// [`Self::placed_boxes`] places them. Returns for each k whether some node is not zero; if k is refined, the same
+    /// for all of them. The nodes of every other k are 0 or unspecified.
     pub(crate) fn decode_some<R: Real>(
         &self,
         wanted: &[bool],
@@ -239,9 +239,9 @@ impl<'a> PredictionPasses<'a> {
         self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
     }
 
-    /// Encodes the source's nodes, `size` along x, y, z of which there may be more than are needed, and fills the field with
-    /// the decoded ones; `split` is scratch. NaN nodes get the code 0. False
-    /// if a code does not fit. `codes` are in order, pass after pass.
+    /// Encodes the source's nodes, and fills the field with the decoded ones. The source has `size` nodes along x, y,
+    /// z, which may be more than are needed; `split` is scratch. NaN nodes get the code 0. False if a code does not
+    /// fit. `codes` are in order, pass after pass.
     pub(crate) fn encode<R: Real>(
         &self,
         step: f64,

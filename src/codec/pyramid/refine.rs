@@ -29,8 +29,8 @@ impl Rows {
     }
 }
 
-/// Refines along any axis but the fastest, and corrects every odd row. The first node that the pass adds to this array is
-/// the `first`-th that it adds.
+/// Refines along any axis but the fastest, and corrects every odd row. `first` is the number, among all nodes that the
+/// pass adds, of the first one in this array.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub(super) fn refine_across<R: Real, C: Correction<R>>(
     stencil: Stencil,

@@ -2,7 +2,7 @@
 //! slice stay in the cache.
 //!
 //! A stage refines slices in space and then, if there is a pass along time, adds the slices between them. Arrays hold
-//! `[slice][z][y][x]`, each the lattice as far as it is refined. Before a pass along time, slices lie at even places.
+//! `[slice][z][y][x]` of the lattice at its current refinement. Before a pass along time, slices lie at even places.
 
 use super::corrections::Correction;
 use super::refine::{Rows, refine_across, refine_lines, refine_slices};
@@ -73,7 +73,7 @@ impl Lattice {
     }
 }
 
-/// A pass: its axis, the nodes along x, y, z, k after it, and those that it adds.
+/// A pass: its axis, the nodes along x, y, z, k after it, and the nodes that it adds.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     pub(super) axis: Option<Axis>,
@@ -119,7 +119,7 @@ impl Stages {
         }
     }
 
-    /// The number of the node at a place among those that a pass adds to a slice, x fastest.
+    /// The number of the node at `place`, counted among the nodes that a pass adds to a slice, x fastest.
     pub(super) fn number(&self, pass: usize, place: usize) -> usize {
         let Lattice { axis, extents: [x, y, z], .. } = self.lattices[pass];
         let (mut node, mut added) = ([place % x, place / x % y, place / (x * y)], [x, y, z]);

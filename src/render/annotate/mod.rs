@@ -227,7 +227,7 @@ pub(crate) fn angles_of(view: &ViewReport) -> String {
     format!("{}°, {}°", volume::text(view.azimuth), volume::text(view.elevation))
 }
 
-/// Draws behind the picture, as far as that is transparent.
+/// Draws behind the picture, so that it shows where the picture is transparent.
 fn behind(canvas: &mut Canvas<'_>, opacity: &dyn Fn(usize) -> f64, draw: impl FnOnce(&mut Canvas<'_>)) {
     let (before, texts) = (canvas.pixels.to_vec(), canvas.taken.clone());
     draw(canvas);

@@ -17,7 +17,7 @@ pub(super) struct Title {
 /// The least height of letters as a share of that of other texts.
 const LEAST: f64 = 0.6;
 
-/// A shorter beginning says nothing.
+/// A title that would be cut to this many letters or fewer is left out.
 const FEW: usize = 4;
 
 impl Title {

@@ -70,7 +70,7 @@ impl Tick {
     }
 }
 
-/// Those that do not touch, from the first on: values of uneven axes may touch whatever their step is.
+/// Drops each tick that touches the one kept before it: on uneven axes, texts may touch whatever the step is.
 fn thinned(ticks: Vec<Tick>) -> Vec<Tick> {
     ticks.into_iter().fold(Vec::new(), |mut kept: Vec<Tick>, tick| {
         if kept.last().is_none_or(|last| !last.touches(&tick)) {

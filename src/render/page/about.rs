@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// Colours of a map that a page gets; it interpolates between them.
 const COLOURS: u32 = 512;
 
-/// What the script of a page is told. Texts of files are data here, and never become markup.
+/// The data for the script of a page. Texts from files are data here, and never become markup.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct About {
     pub(crate) title: String,
@@ -38,7 +38,7 @@ pub(crate) struct About {
     /// The time of each frame.
     pub(crate) labels: BTreeMap<usize, String>,
     pub(crate) sequences: Vec<Sequence>,
-    /// What lies behind the pictures of each view, as the address of a PNG.
+    /// The backdrop of each view, which lies behind its pictures, as the address of a PNG.
     pub(crate) backdrops: Vec<Option<String>>,
     /// How the pictures were made.
     pub(crate) settings: serde_json::Value,

@@ -49,7 +49,7 @@ impl Planes {
         Self { size, numbers, log, planes: Vec::new() }
     }
 
-    /// Adds a picture, whose pixels have their numbers side by side.
+    /// Adds a picture. The numbers of a pixel are side by side in it.
     pub(crate) fn push(&mut self, picture: &[f32], of: impl Fn(f32) -> f32) {
         let plane = |n| picture.iter().skip(n).step_by(self.numbers).map(|value| of(*value)).collect();
         let planes: Vec<Vec<f32>> = (0..self.numbers).map(plane).collect();
@@ -93,7 +93,8 @@ impl Planes {
         Ok(bytes)
     }
 
-    /// Which numbers are missing: a byte for each, its difference to the same of the picture before. Empty if none is.
+    /// Which numbers are missing: a byte for each, 1 where this changes from the picture before. Empty if none is
+    /// missing.
     fn missing(&self) -> io::Result<Vec<u8>> {
         let is_missing = |plane: &Vec<f32>, at: usize| plane[at].is_nan();
         if !self.planes.par_iter().any(|plane| plane.iter().any(|number| number.is_nan())) {
@@ -162,7 +163,8 @@ fn turn(a: &mut [f32], b: &mut [f32]) {
     }
 }
 
-/// A plane in whole steps off what is expected, in bytes of equal weight, packed. Empty for nothing but zeros.
+/// Codes a plane as differences from the expected numbers, in whole steps. The lowest bytes of all differences come
+/// first, then the next ones, and all are packed. Empty if all differences are 0.
 fn code(plane: &[f32], is_known: &[bool], size: [usize; 2], step: f32) -> io::Result<Vec<u8>> {
     let step = f64::from(step);
     let mut rests = Vec::with_capacity(plane.len());
@@ -181,8 +183,8 @@ fn code(plane: &[f32], is_known: &[bool], size: [usize; 2], step: f32) -> io::Re
     packed(&bytes.collect::<Vec<u8>>())
 }
 
-/// Visits the first pixel, then those halfway between known ones, until all are known. `put` is told the place of a pixel
-/// and the number that is expected there, and gives the number that it gets.
+/// Visits the first pixel, then those halfway between known ones, until all are known. `put` takes the place of a pixel
+/// and the number expected there, and returns the number to store.
 fn from_coarse_to_fine([width, height]: [usize; 2], found: &mut [f64], mut put: impl FnMut(usize, f64) -> f64) {
     let Some(first) = found.first_mut() else { return };
     *first = put(0, 0.0);

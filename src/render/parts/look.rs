@@ -1,4 +1,4 @@
-//! What a part says of itself.
+//! The head of a part: its settings, its sources, and where its records lie.
 
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::time_labels::TimeLabels;
@@ -12,14 +12,14 @@ use serde_json::Value;
 /// The version of the format.
 pub(super) const SCHEMA: u32 = 1;
 
-/// The most voxels along an axis, so that a head with a wrong number keeps nobody waiting.
+/// The most voxels along an axis. A head with a larger number is refused, so a wrong number costs no time.
 const MOST_ALONG: usize = 1 << 20;
 /// The most boxes of voxels of a picture.
 pub(super) const MOST_BOXES: usize = 1 << 14;
 /// The most views.
 const MOST_VIEWS: usize = 1 << 16;
 
-/// What all parts of a picture share.
+/// The settings that all parts of a picture share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Look {
@@ -71,13 +71,13 @@ pub struct Look {
 pub struct Source {
     /// Its id.
     pub file: String,
-    /// The first of its frames, and the one behind the last, as the archive numbers them.
+    /// The first of its frames, and the end (exclusive), as the archive numbers them.
     pub frames: [usize; 2],
     /// The times of these frames, or none.
     pub times: Vec<f64>,
 }
 
-/// What a part says of itself.
+/// The head of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Head {
@@ -240,7 +240,8 @@ impl Head {
         ensure(self.sample_error >= 0.0, "has no sound error")
     }
 
-    /// The labels of all frames of the archive. Frames that no source holds have the time of the nearest one that has.
+    /// The labels of all frames of the archive. Frames that no source holds get the time of the last frame before them
+    /// that a source holds, or of the first one.
     pub(super) fn time_labels(look: &Look, sources: &[Source]) -> TimeLabels {
         let mut times: Vec<Option<f64>> = vec![None; sources.iter().map(|of| of.frames[1]).max().unwrap_or(0)];
         for of in sources {

@@ -1,4 +1,4 @@
-//! Files of sums: what a part of the voxels, or of the frames, adds to pictures; and pictures of such files.
+//! Files of partial sums, each over some of the voxels or frames; and pictures made from such files.
 //!
 //! A part is small, however large its archive is: a number or two for each pixel and frame. Numbers are little-endian.
 //!

@@ -20,7 +20,7 @@ const HEAD_SHARE: u64 = 4;
 #[derive(Debug)]
 pub struct PartFile {
     path: PathBuf,
-    /// What it says of itself.
+    /// Its settings, sources and records.
     pub head: Head,
     /// Bytes of its head, unpacked.
     pub(super) head_bytes: usize,
@@ -37,7 +37,7 @@ impl PartFile {
     /// Opens a part, and reads its head within `memory` bytes.
     ///
     /// # Errors
-    /// A file that cannot be read, is no part, is damaged, or whose numbers contradict each other.
+    /// A file that cannot be read, is not a part, is damaged, or contradicts itself.
     pub fn open(path: &Path, memory: usize) -> Result<Self> {
         refuse_address(path)?;
         let doing = |e| Error::io(path, "reading", e);

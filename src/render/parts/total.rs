@@ -72,7 +72,7 @@ impl Total {
         Ok(total)
     }
 
-    /// What all parts share.
+    /// The settings that all parts share.
     pub fn look(&self) -> &Look {
         &self.look
     }
@@ -82,7 +82,7 @@ impl Total {
         self.parts.len()
     }
 
-    /// The share of the lattice whose voxels the parts have, 0 to 1.
+    /// The share of the lattice's voxels that the parts have, 0 to 1.
     pub fn covered(&self) -> f64 {
         self.voxels() as f64 / self.look().grid.whole().voxels() as f64
     }

@@ -99,7 +99,8 @@ fn layout(
 }
 
 /// Whether splatting the values of the requested frames is less work than splatting the coefficients that they need.
-/// This counts all requested frames of the window and not those of a batch, whose size depends on the memory.
+/// This counts all requested frames of the window, not those of a batch, since the size of a batch depends on the
+/// memory.
 fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
     let range = file.window_range(window);
     let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();

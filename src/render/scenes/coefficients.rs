@@ -40,8 +40,8 @@ impl CoefficientScene {
         Self { fetched: vec![0; file.channels()], file, what }
     }
 
-    /// Fetches what a remote file holds of the next frames of a request: at least what is asked for, and of later windows as
-    /// much as fits.
+    /// Fetches the bytes of a remote file that the next frames of a request need: all of the first window, and as many
+    /// later windows as fit.
     fn fetch_ahead(&mut self, request: &BatchRequest<'_>) -> Result<()> {
         let (file, channel, config) = (&self.file, request.channel, request.config);
         if !file.is_remote() || request.frames[0] < self.fetched[channel] {
@@ -328,7 +328,7 @@ impl<'a> CoefficientBatch<'a> {
         Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
     }
 
-    /// Gathers what is read of some blocks, the first ones first, until there is as much as is fetched at a time.
+    /// Gathers the parts to read of some blocks, in order, until there are as many as should be fetched together.
     fn gather(&self, blocks: &[usize], gathered: &mut Gathered) -> Result<()> {
         let BatchPlan { codec, wanted, .. } = &self.plan;
         for block in blocks {

@@ -38,7 +38,7 @@ pub(super) fn of_file(
     Ok(samples)
 }
 
-/// Fetches what the overview needs of a remote file, as much as it keeps.
+/// Fetches the parts that the overview needs from a remote file, as many as should be fetched together.
 fn fetch(file: &CoefficientFile, request: &OverviewRequest<'_>, windows: &[&[usize]]) -> Result<()> {
     if !file.is_remote() {
         return Ok(());

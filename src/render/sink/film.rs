@@ -31,7 +31,7 @@ pub(crate) struct Film {
     /// The sequence of the waiting pictures.
     sequence: usize,
     waiting: Planes,
-    /// How many pictures of each sequence were given away.
+    /// How many pictures of each sequence are already in blocks.
     given: Vec<usize>,
 }
 
@@ -44,7 +44,7 @@ pub(crate) struct Place {
     pub(crate) count: usize,
 }
 
-/// What takes the pictures of a block.
+/// Takes the pictures of a complete block.
 pub(crate) type Give<'a> = dyn FnMut(Place, Planes) -> Result<()> + 'a;
 
 /// The most memory that the pictures of a block take.
@@ -125,7 +125,7 @@ impl Film {
         Ok(())
     }
 
-    /// What lies behind the pictures of a view, if anything does.
+    /// The backdrop of a view: a PNG that lies behind its pictures. `None` if nothing is drawn there.
     fn backdrop(&self, view: &ViewReport) -> Result<Option<String>> {
         let (size, background) = (self.config.size, self.config.colours.background());
         let mut pixels = vec![background; size[0] * size[1]];

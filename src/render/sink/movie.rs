@@ -23,7 +23,7 @@ pub enum MovieFormat {
 const TO_VIDEO: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p";
 /// A palette for each picture, so that ffmpeg keeps no more than one.
 const TO_GIF: &str = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=sierra2_4a";
-/// What players must know of the colours.
+/// Tags that tell players the colour space.
 const TAGS: [&str; 6] = ["-color_primaries", "bt709", "-color_trc", "bt709", "-colorspace", "bt709"];
 
 /// The longest comment, in letters.

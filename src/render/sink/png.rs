@@ -166,7 +166,7 @@ impl Write for Shared {
     }
 }
 
-/// The system's error, whose kind tells a broken pipe from other failures.
+/// The system's error. Its kind tells a broken pipe from other failures.
 fn cause(error: png::EncodingError) -> io::Error {
     match error {
         png::EncodingError::IoError(e) => e,

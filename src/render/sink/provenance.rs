@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use std::fmt::Display;
 
-/// How the pictures of a run were made. It has no paths, says not when, and does not depend on threads or memory. Keys
+/// How the pictures of a run were made. It contains no paths or dates, and does not depend on threads or memory. Keys
 /// have the names of the options, and values have the form that the options accept.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Provenance {

@@ -156,7 +156,7 @@ impl<B: Blend> Batch<'_, B> {
         Ok(middles.into_iter().map(|middle| self.blend.units(middle.unwrap_or(0.0))).collect())
     }
 
-    /// Reads the blocks of a layer, as far as they are needed.
+    /// Reads the blocks of a layer that are needed, and fills the others with one value.
     fn read(
         &self,
         known: &Known,

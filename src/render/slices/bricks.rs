@@ -13,7 +13,8 @@ pub(super) struct Ranges {
     pub(super) largest: Vec<f32>,
 }
 
-/// The ranges of a layer, of which `columns` numbers of each row are samples, and whether any sample is missing.
+/// The ranges of a layer's bricks, and whether any sample is missing. The first `columns` numbers of each row are
+/// samples.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub(super) fn ranges(layer: &[f32], (stride, columns): (usize, usize)) -> (Ranges, bool) {
     let (mut found, mut any) = (Ranges { columns: stride / GROUP, ..Ranges::default() }, false);

@@ -49,7 +49,7 @@ pub(super) struct Meeting {
     sheets: Sheets,
 }
 
-/// What a ray passes of a surface.
+/// Which sheets of a surface a ray passes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sheets {
     One,
@@ -129,7 +129,7 @@ impl Rays {
         (meeting.covered > 0.0).then_some(meeting)
     }
 
-    /// Marks the cells between whose places in two slices a surface of some values may show.
+    /// Marks the cells in which one of the surfaces may show between two slices.
     pub(super) fn near(&self, values: &[f32], from: &Slope, to: &Slope) -> [bool; GROUP] {
         values.iter().fold([false; GROUP], |marked, value| {
             let near = near(from, to, *value, self);
@@ -137,8 +137,8 @@ impl Rays {
         })
     }
 
-    /// The share of a cell that a surface covers whose ray turns back at a height beyond it; a ray that turns back before
-    /// it has a negative height.
+    /// The share of a cell that a surface covers if the ray turns back at `height` beyond it. The height is negative if
+    /// the ray turns back before the surface.
     pub(super) fn of_height(&self, height: f32, gradient: &[f32; 3]) -> f32 {
         share(height, self.width * length([gradient[0], gradient[1]]))
     }

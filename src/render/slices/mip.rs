@@ -107,7 +107,7 @@ type Four = [f32; 4];
 fn nearest(inner: [f32; 4], across: [f32; 4], down: [f32; 4]) -> f32 {
     let near = |n: usize| across[1 + n % 2] * down[1 + n / 2];
     let best = (0..4).filter(|n| inner[*n] > NONE).max_by(|a, b| near(*a).total_cmp(&near(*b)));
-    // A pixel whose nearest cell with a value has less weight is background.
+    // If the nearest cell with a value has less weight than this, the pixel is background.
     best.filter(|n| near(*n) >= 0.25).map_or(NONE, |n| inner[n])
 }
 

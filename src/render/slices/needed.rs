@@ -6,7 +6,7 @@ use super::view::SlicedView;
 use crate::base::grid::BlockGrid;
 use crate::render::scene::Selection;
 
-/// What is known of a batch's blocks before any is read.
+/// What is known about the blocks of a batch before any block is read.
 pub(super) struct Known {
     blocks: BlockGrid,
     /// A range that holds the samples of each block; inverted if all are missing.
@@ -21,7 +21,7 @@ pub(super) struct Known {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Need {
     Read,
-    /// All samples are this value, or none of them shows and any value within the block's range will do.
+    /// All samples have this value; or none is visible, and this is some value of the block's range.
     Fill(f64),
     /// The same for a block that no open cell needs.
     Hidden(f64),

@@ -1,8 +1,8 @@
 //! Probes a picture: the field along the rays of a few pixels, without lattice, table or slices, against the finished
 //! pixels.
 //!
-//! The errors at these pixels are an estimate of those of the picture. They include all steps from samples to pixels.
-//! They do not include the errors of samples, and of the kernel's cut.
+//! The errors at these pixels estimate the errors of the picture. They include all steps from samples to pixels, but
+//! not the errors of the samples or of the kernel's cut.
 
 use super::LEAST;
 use super::layer::Layers;

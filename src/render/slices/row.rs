@@ -35,8 +35,8 @@ pub(in crate::render) struct Row<'a> {
     pub(super) live: &'a [bool],
     pub(super) whole: &'a [bool],
     pub(super) slice: u32,
-    /// The place of the first cell in voxels along b, c and a, of which those along a are counted along the ray. The
-    /// cells of a row are a voxel apart along b.
+    /// The place of the first cell in voxels along b, c and a. Voxels along a are counted along the ray. The cells of a
+    /// row are a voxel apart along b.
     pub(super) place: [f32; 3],
     /// The stops of each group; none if no ray ends early.
     pub(super) stops: &'a [Sixteen],
@@ -198,7 +198,7 @@ pub(in crate::render) trait Blend: Sync {
     /// Whether cells with this limit hide everything.
     fn is_closed(limit: f32) -> bool;
 
-    /// The limit of a group whose rays are over.
+    /// The limit of a group after all its rays have ended.
     const OVER: f32;
 
     /// Adds the live groups of a row behind the slices before, and updates their limits.

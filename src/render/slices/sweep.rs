@@ -265,7 +265,7 @@ impl Across {
     }
 }
 
-/// The weights along c of a row of cells, and what they make of those along a.
+/// The weights along c of a row of cells, combined with the weights along a.
 struct Down<'a> {
     /// The positions along c and a.
     position: [f64; 2],

@@ -27,7 +27,7 @@ pub(in crate::render) struct Table {
     visible: Vec<u16>,
 }
 
-/// Red, green and blue times the opacity, and minus the opacity, of a slice whose rays are `length` units long.
+/// Red, green and blue times the opacity, and minus the opacity, of a slice in which rays are `length` units long.
 fn light(transfer: &TransferFunction, length: f64, value: f64) -> [f64; 4] {
     let extinction = -libm::log1p(-transfer.opacity(value).min(MOST_OPAQUE));
     let opacity = -libm::expm1(-extinction * length);

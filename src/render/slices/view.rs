@@ -272,7 +272,7 @@ impl SlicedView {
         1.0 / self.fineness as f64
     }
 
-    /// The same view with a number of slices per voxel, and how many slices of this view make one of those.
+    /// The same view with `fineness` slices per voxel, and the number of slices of this view per slice of that one.
     pub(super) fn with_slices(&self, fineness: usize) -> (Self, f64) {
         (Self { fineness, ..self.clone() }, self.fineness as f64 / fineness as f64)
     }

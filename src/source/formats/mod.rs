@@ -108,19 +108,19 @@ pub(in crate::source) enum Format {
 }
 
 impl Format {
-    /// By extension; none for headerless data and for what is not supported.
+    /// The format by extension; `None` for headerless data and unsupported formats.
     pub(in crate::source) fn by_name(path: &Path) -> Option<Self> {
         let found = extension(path);
         EXTENSIONS.into_iter().find(|(ending, _)| *ending == found).map(|(_, format)| format)
     }
 
-    /// By extension, or by what is in a folder.
+    /// The format by extension, or Zarr for a folder that is a Zarr store.
     fn of_file(path: &Path) -> Option<Self> {
         let is_store = path.is_dir() && zarr_metadata(path).is_some();
         if is_store { Some(Self::Zarr) } else { Self::by_name(path) }
     }
 
-    /// Whether a file of it holds frames, and says itself what they are.
+    /// Whether a file of this format holds frames and describes them in a header.
     pub(in crate::source) fn holds_frames(self) -> bool {
         match self {
             Self::Npy
@@ -200,14 +200,14 @@ pub(super) fn zarr_metadata(folder: &Path) -> Option<PathBuf> {
     names.map(|name| folder.join(name)).find(|path| path.is_file())
 }
 
-/// The extension in lower case, or nothing. That of a compressed file says what is compressed: `nii.gz`.
+/// The extension in lower case, or an empty text. A compressed file keeps its inner extension: `nii.gz`.
 pub(in crate::source) fn extension(path: &Path) -> String {
     let last = |path: &Path| path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (own, inner) = (last(path), last(&path.with_extension("")));
     if own == "gz" && COMPRESSED.contains(&inner.as_str()) { format!("{inner}.gz") } else { own }
 }
 
-/// Whether a file says itself what it holds.
+/// Whether a file has a header that describes its contents.
 pub(in crate::source) fn has_header(path: &Path) -> bool {
     Format::of_file(path).is_some() || Format::by_content(path).is_ok_and(|format| format.is_some())
 }
@@ -314,7 +314,7 @@ fn unknown(path: &Path) -> Error {
     Error::path(path, Note::with("is of no known format", Remedy::DescribeSamples))
 }
 
-/// Options that would be ignored are refused, so that nobody thinks they had an effect.
+/// Refuses options that would be ignored, so that users do not think that they had an effect.
 pub(in crate::source) fn refuse_options(path: &Path, format: Format, options: &OpenOptions) -> Result<()> {
     let given = [
         (options.dims.is_some(), "dims"),

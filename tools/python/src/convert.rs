@@ -43,7 +43,7 @@ pub(crate) struct Settings {
     memory: usize,
 }
 
-/// Of the memory, what a window of frames may take.
+/// A window of frames may take one part in this many of the memory.
 const SHARE: usize = 4;
 
 impl Settings {

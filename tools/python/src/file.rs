@@ -17,7 +17,7 @@ use wavesplat::file::report::BoundReport;
 use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::remote::{Cache, RemoteOptions};
 
-/// Reads of fewer bytes end soon: nobody needs to interrupt them.
+/// Reads of fewer bytes end so soon that they need not be interruptible.
 const SHORT: usize = 16 << 20;
 
 /// Opens a file by its path or address.

@@ -77,7 +77,7 @@ pub(crate) fn run<T: Send>(
     Ok(done)
 }
 
-/// Makes calls and reports progress until nobody can call any more. Returns the exception that cancelled the work.
+/// Makes calls and reports progress until the work has ended. Returns the exception that cancelled it.
 fn serve(called: &Receiver<Call>, job: &Work, report: Option<&Py<PyAny>>) -> Option<PyErr> {
     let (mut raising, mut looked) = (None, Instant::now());
     loop {

@@ -47,7 +47,7 @@ impl GivenArray<'_> {
     }
 }
 
-/// Arrays whose numbers a function of Python reads.
+/// Arrays that a Python function reads.
 pub(crate) struct PythonArrays {
     arrays: Vec<NamedArray>,
     attributes: Vec<Attribute>,

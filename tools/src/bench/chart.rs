@@ -83,7 +83,7 @@ pub(super) fn draw(figure: &Figure, path: &Path) -> Result<()> {
     whole(figure, &root, (rows, columns)).map_err(|e| Error::io(path, "drawing", std::io::Error::other(e.to_string())))
 }
 
-/// The legend and all panels, the first of which stand on the upper left.
+/// The legend and all panels. The first panels are at the upper left.
 fn whole(figure: &Figure, root: &Area<'_>, grid: (usize, usize)) -> Drawn {
     root.fill(&WHITE)?;
     let (head, body) = root.split_vertically(figure.head());

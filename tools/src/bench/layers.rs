@@ -1,4 +1,4 @@
-//! Another benchmark: what a looser tolerance of a picture leaves unread, and how far off the picture then is.
+//! Another benchmark: how much of a file a picture with a looser tolerance leaves unread, and how large its error is.
 
 use super::camera::{CameraSettings, SIGMA};
 use super::json::bad_json;
@@ -20,9 +20,9 @@ use wavesplat::view::footprint::Kernel;
 
 /// The number of the layout of `layers.json`; a change of a key's meaning changes it.
 pub const SCHEMA: u32 = 1;
-/// What files are converted with, as a share of the value range.
+/// The tolerance of the files, as a share of the value range.
 const FINE: f64 = 1e-3;
-/// What splatting may add: little, so that it is not what is compared.
+/// The splat error: small, so that it hardly affects the comparison.
 const SPLAT: f64 = 1e-5;
 /// Pixels a side of a picture.
 const SIZE: usize = 256;
@@ -34,11 +34,11 @@ const REPEATS: usize = 3;
 pub struct Config {
     /// Archives.
     pub inputs: Vec<PathBuf>,
-    /// Of pictures, as shares of the value range.
+    /// Tolerances of pictures, as shares of the value range.
     pub tolerances: Vec<f64>,
     /// The folder of results.
     pub output: PathBuf,
-    /// `wavesplat-tools` itself, whose `bench-step` measures.
+    /// The path of `wavesplat-tools`, which measures with its command `bench-step`.
     pub program: PathBuf,
     /// The day to write into the results; by default that of the clock.
     pub date: Option<String>,

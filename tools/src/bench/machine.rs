@@ -16,14 +16,14 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// The one this runs on.
+    /// The machine that this runs on.
     pub(super) fn this() -> Self {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Self { cpu: cpu(), cores, system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH) }
     }
 }
 
-/// What stands first in every file of results.
+/// The first entries of every file of results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The number of the file's layout.

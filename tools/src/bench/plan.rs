@@ -179,7 +179,8 @@ impl Contender {
         if let Self::Coefficients(_, bound) = self { Some(bound.name) } else { None }
     }
 
-    /// The number of timed runs: one for all bounds but the first, of which only sizes and errors are compared.
+    /// The number of timed runs. It is one for every bound but the first, since only sizes and errors of these are
+    /// compared.
     pub fn rounds(&self, repeats: usize) -> usize {
         match self {
             Self::Coefficients(_, bound) if bound.name != BOUNDS[0].name => 1,
@@ -195,7 +196,8 @@ impl Contender {
 }
 
 impl Group {
-    /// The number of timed conversions: one in the second sweep, whose conversions are those of the first.
+    /// The number of timed conversions. It is one in the second sweep, since its conversions are those of the first
+    /// sweep.
     pub fn rounds(&self, repeats: usize) -> usize {
         if self.splat.is_some() { 1 } else { repeats }
     }

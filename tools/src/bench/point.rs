@@ -20,7 +20,7 @@ pub struct Results {
 pub struct Point {
     /// The name: group, method, bound.
     pub key: String,
-    /// The name of the group, whose points were measured in turns.
+    /// The name of the group. The points of a group were measured in turns.
     pub group: String,
     /// The sweep: `tolerance` or `splat`.
     pub sweep: String,

@@ -16,7 +16,7 @@ pub struct Config {
     pub sweep: Sweep,
     /// The folder of results.
     pub output: PathBuf,
-    /// `wavesplat-tools` itself, whose `bench-step` runs the stages.
+    /// The path of `wavesplat-tools`, which runs the stages with its command `bench-step`.
     pub program: PathBuf,
     /// Begin anew where there are results already.
     pub force: bool,
@@ -24,7 +24,7 @@ pub struct Config {
     pub date: Option<String>,
 }
 
-/// What all points of a run share: a run goes on only with the same.
+/// The settings that all points of a run share. An interrupted run continues only with the same settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// [`SCHEMA`].

@@ -88,7 +88,7 @@ struct Run {
 }
 
 impl Run {
-    /// Seconds to transform, splat and invert; and with reading, as far as it is not part of the transform.
+    /// Seconds to transform, to splat (with decoding), and to invert.
     fn seconds(&self) -> [f64; 3] {
         let RenderReport { decode_seconds, splat_seconds, inverse_seconds, .. } = &self.render;
         let transform = self.converted.as_ref().map_or(0.0, |(report, _)| report.seconds);

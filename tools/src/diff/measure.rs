@@ -74,7 +74,7 @@ impl Differences {
         self.squares += difference * difference;
     }
 
-    /// Adds what was found of numbers that lie `offset` after the first.
+    /// Adds the sums over numbers that lie `offset` after the first.
     pub fn join(&mut self, other: &Self, offset: u64) {
         if other.largest() > self.largest() {
             self.at = other.at.map(|at| at + offset);

@@ -30,8 +30,8 @@ pub struct Report {
     pub peak: f64,
     /// Statistics of all frames.
     pub all: Statistics,
-    /// The frame with the largest difference, and of several the one with the largest sum of squares; none if there is
-    /// only one frame.
+    /// The frame with the largest difference; of several such frames, the one with the largest sum of squares. None if
+    /// there is only one frame.
     pub worst: Option<WorstFrame>,
     /// The heat map, if one was drawn.
     pub heat_map: Option<HeatMap>,

@@ -12,8 +12,8 @@ const BACKGROUND: Rgb = [0; 3];
 /// rays leave sooner.
 const HAZE: f64 = 1.0 / 8.0;
 const SHELL: f64 = 1.0 / 32.0;
-/// The share of rays whose largest sample, and of pixels whose value, lies within the range of colours. A few may be
-/// far brighter.
+/// The shares of rays, by their largest sample, and of pixels, by their value, that lie within the range of colours.
+/// The few others may be far brighter.
 const OF_RAYS: f64 = 0.95;
 const OF_PIXELS: f64 = 0.99;
 /// A logarithmic norm starts at this share of the largest value: smaller values are too close to the error of
@@ -53,7 +53,7 @@ pub(super) struct Tile {
 }
 
 impl SampleStyle {
-    /// For samples of a range, of which rays meet the `largest`.
+    /// Settings for samples of a range. `largest` has the largest sample of each ray.
     pub(super) fn new((lo, hi): (f64, f64), (samples, largest): (Distribution, &[f32]), grid: &Grid) -> Self {
         let both_signs = lo < 0.0 && 0.0 < hi;
         let reached = spread(largest, OF_RAYS).1;
@@ -69,7 +69,7 @@ impl SampleStyle {
         Self { both_signs, range, thickness: extent.fold(f64::INFINITY, f64::min), samples, path }
     }
 
-    /// What suits values of one sign, or of both.
+    /// The choice for values of one sign, or of both.
     fn either<T>(&self, one: T, both: T) -> T {
         if self.both_signs { both } else { one }
     }
@@ -144,7 +144,7 @@ pub(super) fn short(value: f64) -> String {
 }
 
 impl Tile {
-    /// With the colours of a map, whose name ends the options.
+    /// A tile with the colours of a map. The map's name is added to the options.
     fn of_values(mode: Mode, options: &str, map: &str) -> Result<Self> {
         let label = format!("{options} {map}");
         Ok(Self { label, mode, map: TransferFunction::open(map)?, norm: Norm::Linear })
@@ -173,7 +173,7 @@ impl Tile {
     }
 }
 
-/// The least of some values, and what such a share of them stays within; 0 and 1 if there is none.
+/// The least of some values, and the value below which this share of them lies; 0 and 1 if there are none.
 fn spread(values: &[f32], share: f64) -> (f64, f64) {
     let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f32::total_cmp);

@@ -101,11 +101,10 @@ impl Streams {
         Ok(())
     }
 
-    /// Reads the significance bytes of a row, and counts the ones of each.
+    /// Reads the significance bytes of a row. Counts the ones of each byte, and lists the cells that are not zero;
+    /// `marked` has room for one cell more than a row has.
     ///
     /// Every cell depends on the one before it, so runs of zeros with zero neighbours are read together.
-    ///
-    /// Lists those that are not zero; there is room for one more than a row has.
     fn mark<'m>(&mut self, around: &[u8], counts: &mut [u8], marked: &'m mut [Marked]) -> &'m [Marked] {
         counts.fill(0);
         let (symbols, mut next, mut before, mut x, mut found) = (&self.symbols[..], self.classes, 0, 0, 0);
@@ -133,8 +132,8 @@ impl Streams {
         &marked[..found]
     }
 
-    /// Reads the values of the marked cells of a row; the first code of its first cell has the place `start`, that of the
-    /// next cell is `apart` from it.
+    /// Reads the values of the marked cells of a row. The first code of the row's first cell has the place `start`; the
+    /// first codes of neighbouring cells are `apart` places apart.
     fn scatter(&mut self, (start, apart): (u32, u32), offsets: &Offsets, marked: &[Marked], out: &mut Found<'_, '_>) {
         for &Marked { x, byte, activity } in marked {
             let count = ONES[usize::from(byte)];

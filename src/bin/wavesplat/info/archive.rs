@@ -25,7 +25,7 @@ struct Info<'a> {
     times: &'a [f64],
     #[serde(skip)]
     span: Option<String>,
-    /// Of each time, where a calendar is known; else empty.
+    /// The date of each time if the calendar is known, else empty.
     dates: Vec<String>,
     variable: Option<&'a str>,
     units: Option<&'a str>,
@@ -37,7 +37,7 @@ struct Info<'a> {
     raw_bytes: Option<u64>,
     notes: Vec<String>,
     estimate: Option<Estimate>,
-    /// Of several tolerances.
+    /// Estimates for several tolerances.
     estimates: Vec<Estimate>,
 }
 

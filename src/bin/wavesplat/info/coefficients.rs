@@ -28,7 +28,7 @@ struct Info {
     colours: Option<String>,
     frames: u64,
     times: Vec<f64>,
-    /// Of each time, where a calendar is known; else empty.
+    /// The date of each time if the calendar is known, else empty.
     dates: Vec<String>,
     #[serde(skip)]
     span: Option<String>,
@@ -53,7 +53,7 @@ struct Info {
     /// The options of `wavesplat convert` that reproduce the file, by name.
     options: BTreeMap<&'static str, String>,
     program: String,
-    /// What is kept of the source beside the samples.
+    /// The metadata of the source that the file keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     description: Option<serde_json::Value>,
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! Describes what a file keeps of its source beside the samples.
+//! Describes the metadata of the source that a file keeps.
 
 use serde_json::{Map, Value, json};
 use std::fmt::Write;

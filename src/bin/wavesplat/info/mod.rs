@@ -24,8 +24,8 @@ pub(crate) struct InfoArgs {
     /// A coefficient file, or frames as for convert
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// For frames: convert a few blocks, and estimate the size of a coefficient file of this tolerance [a table of five if
-    /// none is given]
+    /// For frames: convert a few blocks, and estimate the size of the coefficient file at this tolerance [a table of
+    /// five tolerances if none is given]
     #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true)]
     estimate: Option<Option<f64>>,
     #[command(flatten)]

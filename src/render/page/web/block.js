@@ -35,7 +35,7 @@ async function codedPlanes({ size, numbers, step, log, lengths, missing }, body)
   return planes;
 }
 
-// A plane of coefficients: what is expected of every pixel, plus what the bytes say.
+// A plane of coefficients: for every pixel, the expected number plus the difference in the bytes.
 function decoded(bytes, [width, height], step) {
   const pixels = width * height, plane = new Float32Array(pixels);
   if (!bytes) return plane;
@@ -91,7 +91,7 @@ function turn(a, b) {
   }
 }
 
-// Each byte of the mask says whether a number is missing, or not, unlike that of the picture before.
+// Each byte of the mask is 1 where a number is missing and was not in the picture before, or the other way round.
 function removeMissing(planes, numbers, mask) {
   const pixels = planes[0].length, state = new Uint8Array(numbers * pixels);
   planes.forEach((plane, p) => {

@@ -16,7 +16,7 @@ function tableOf(bytes) {
   return table;
 }
 
-// Maps whose middle is for 0, and the share of one side that the other must have for that.
+// Maps with 0 in the middle of signed ranges: those in which one side of 0 is longer than this share of the other.
 const DIVERGING = ['coolwarm'], SIDE = 0.05;
 
 // The range to stretch a map over, as src/colour/mod.rs has it.

@@ -6,7 +6,7 @@ const REST = 250; // milliseconds without a change after which pictures are comp
 const PATIENCE = 600; // milliseconds after which a request says how far it is
 const SLOW = 30e6; // bytes per second below which answers are packed
 
-// Who asks for pictures. Nobody stops those of somebody who ranks higher.
+// Ranks of requests. A request never cancels one of higher rank.
 const AHEAD = 0, PLOT = 1, USER = 2;
 
 class Stale extends Error {}
@@ -57,7 +57,7 @@ class Live {
     };
   }
 
-  // The same for all pictures that share their automatic colours. Slices have those of their places as soon as they rest.
+  // A key for all pictures that share automatic colours. Slices get the colours of their places as soon as they rest.
   colourKey(isFull) {
     const { mode, map, slices } = this.look;
     if (mode !== 'slice') return `${mode === 'error' ? 'mean' : mode} ${map ?? ''}`;
@@ -65,7 +65,7 @@ class Live {
     return isFull || this.known[own] ? own : this.ofSlices ?? own;
   }
 
-  // The same for all requests whose pictures are the same but for the frame.
+  // A key for all requests that differ only in the frame.
   key(isFull) {
     const isChosen = this.look.mode === 'composite' && this.look.range;
     return JSON.stringify({ ...this.request(null, isFull), ...(isChosen ? {} : { range: null }), clear: null, packed: null, colours: this.colourKey(isFull) });
@@ -89,7 +89,7 @@ class Live {
     }
   }
 
-  // A complete picture for a plot. It asks again while what the user sees comes first.
+  // A complete picture for a plot. Requests for what the user sees come first; then it asks again.
   async whole(_, index, isWanted) {
     const key = this.key(true);
     for (;;) {
@@ -102,7 +102,7 @@ class Live {
     }
   }
 
-  // The frames that are asked for together, around one.
+  // The frames to ask for together, around one.
   block(index) {
     const { mode } = this.look, [width, height] = this.fullSize();
     if (mode === 'error') return [index, index + 1]; // errors take long
@@ -112,7 +112,7 @@ class Live {
     return [first, Math.min(first + count, this.sequences[0].pictures.length)];
   }
 
-  // Loads pictures in turn, and stops what does not help. Those that nobody wants any more are not asked for.
+  // Loads pictures in turn. Stops a running request that does not help, and never sends one that is no longer wanted.
   async load(key, { frames, isFull, index, rank }) {
     const { underWay, turn: before } = this, isOfUser = rank === USER;
     const isHelp = underWay?.key === key && underWay.frames[0] <= index && index < underWay.frames[1];
@@ -200,7 +200,7 @@ class Live {
     document.documentElement.dataset.filled = index;
   }
 
-  // Stops what nobody waits for.
+  // Stops loading pictures ahead of the user.
   halt() {
     clearTimeout(this.filling);
     if (this.underWay?.rank === AHEAD) this.underWay.stop.abort();
@@ -219,7 +219,7 @@ class Live {
     this.changed();
   }
 
-  // Asks the server. While it does not answer, asks again; while it works, says how far it is.
+  // Asks the server, again and again until it answers. Shows its progress while it works.
   async post(where, request, signal) {
     const working = setInterval(async () => {
       const share = await fetch('progress').then(answer => answer.text()).catch(() => '');
@@ -247,7 +247,7 @@ class Live {
     }
   }
 
-  // Asks for a file of what is seen, or for its command.
+  // Asks for a file of the current view, or for its command.
   async made(where, file) {
     const frames = file.endsWith('.png') ? [this.index, this.index + 1] : [0, this.sequences[0].pictures.length];
     const certify = where === 'command' && this.look.mode === 'error';

@@ -44,7 +44,7 @@ class Player {
 
   get pictures() { return this.source.sequences[this.sequence].pictures; }
 
-  // Follows the description of pictures. Colours that nobody chose follow, too.
+  // Follows the description of pictures. Colours that the user did not choose follow, too.
   adopt(about) {
     const isOther = about.mode !== this.about?.mode || about.kind !== this.about?.kind;
     this.about = about;
@@ -75,7 +75,7 @@ class Player {
     element('gamma').value = gamma;
   }
 
-  // What was chosen for pictures of this kind.
+  // The user's choices for pictures of this kind.
   get ownColours() { return this.chosen[`of ${this.about.mode}`] ??= {}; }
 
   // The range: as chosen, or that of the pictures, with 0 in the middle of a map that diverges from it.
@@ -238,7 +238,7 @@ class Player {
     if (isPlaying) this.run();
   }
 
-  // Shows one picture after another, none before the one before it is there.
+  // Shows one picture after another, each only after the one before it has loaded.
   async run() {
     let due = performance.now();
     while (this.isPlaying) {
@@ -328,7 +328,7 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-// Whether an error says only that something else is wanted more.
+// Whether an error means only that another request came first.
 const isPassing = error => error.name === 'AbortError' || error.constructor.name === 'Stale';
 
 // Says what went wrong.

@@ -1,4 +1,4 @@
-// What a user does to the camera and the scene of a live page.
+// The user's control of the camera and the scene of a live page.
 
 const AXES = ['x', 'y', 'z'];
 

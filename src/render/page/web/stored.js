@@ -43,7 +43,7 @@ class Stored {
     return found;
   }
 
-  // What lies behind the pictures of a view.
+  // The backdrop of a view, which lies behind its pictures.
   backdrop(view) {
     const address = this.about.backdrops[view];
     if (!address) return null;

@@ -117,8 +117,9 @@ struct Axis {
     amplified: f64,
 }
 
-/// Positions of a slice and of a pixel between cells that are tried. The errors are sums of waves with periods of one
-/// cell and less, of which the longest dominate, so the largest lies at most 1 - cos(pi / 12) above those found.
+/// Number of positions between cells that are tried for a slice and for a pixel. The errors are sums of waves with
+/// periods of one cell and less. The longest waves dominate, so the largest error lies at most 1 - cos(pi / 12) above
+/// those found.
 const PHASES: usize = 12;
 /// Every so many positions give a lower bound.
 const FEW: usize = 4;

@@ -9,7 +9,8 @@ use crate::source::layout::Counts;
 const ORDER: [Counts; 4] = [Counts::Frames, Counts::Voxels(2), Counts::Voxels(1), Counts::Voxels(0)];
 const LETTERS: [char; 4] = ['t', 'z', 'y', 'x'];
 
-/// A note on axes that were taken by their order alone, since they are not `known`; nothing if there are none.
+/// A note on axes whose meaning was guessed from their order, because it is not `known`; `None` if there are no such
+/// axes.
 fn note(variable: &Variable, known: &[Option<Counts>], counts: &[Counts]) -> Option<Note> {
     let guessed = |axis: &usize| known[*axis].is_none() && !matches!(counts[*axis], Counts::Only(_));
     (0..counts.len()).find(guessed)?;
@@ -51,8 +52,8 @@ impl TimeHint {
     }
 }
 
-/// What each axis counts, the slowest first, and notes on what is guessed; `index` is that of an axis beside space and
-/// time, `letters` what the user says.
+/// Finds what each axis counts, the slowest first, with notes on guesses. `index` is the chosen index of an axis other
+/// than space and time; `letters` is the user's choice.
 pub(super) fn counts(
     variable: &Variable,
     all: &[Variable],
@@ -173,8 +174,8 @@ pub(super) fn of_name(dim: &str) -> Option<Counts> {
 /// Components that a vector or a tensor has at most.
 const MOST_COMPONENTS: usize = 9;
 
-/// Which of some axes, of which there is one, probably counts components: the only short one, else the last. If no axis is
-/// known to count frames, the slowest one probably does.
+/// Chooses, among one or more free axes, the one that probably counts components: the only short one, else the last. If
+/// no axis is known to count frames, the slowest one probably does, so it is not considered short.
 fn component_axis(variable: &Variable, free: &[usize], is_timed: bool) -> usize {
     let is_short = |axis: &usize| (2..=MOST_COMPONENTS).contains(&variable.lengths[*axis]);
     let mut short = (usize::from(!is_timed)..free.len()).filter(|at| is_short(&free[*at]));

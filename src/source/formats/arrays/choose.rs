@@ -6,7 +6,7 @@ use crate::source::variables::{self, VariableAxis};
 use crate::source::{self, Advised, Parsed};
 use std::collections::{BTreeMap, HashSet};
 
-/// What stands for the number of a step in the path of a variable that has one array for each.
+/// The placeholder for the step number in the path of a variable that has one array per step.
 pub(super) const STEP: &str = "%T";
 
 /// A variable: an array, or one for each step.
@@ -49,7 +49,8 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// The variable of a path, or of a name that only one has; and an index, as of a component.
+/// Finds the variable by its path, or by its name if only one variable has that name. Also returns the given index,
+/// such as that of a component.
 pub(super) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>, Option<usize>)> {
     let stepped = choices(all.iter());
     let singles: Vec<_> = all.iter().map(Choice::single).collect();
@@ -104,7 +105,7 @@ fn volumes<'a>(all: &'a [Variable], active: Option<&str>) -> Vec<Choice<'a>> {
     }
 }
 
-/// Variables, those whose arrays differ in the number of one group as one.
+/// Groups arrays into variables: arrays whose paths differ only in the number of one group are one variable.
 fn choices<'a>(all: impl Iterator<Item = &'a Variable>) -> Vec<Choice<'a>> {
     let (mut steps, mut found): (BTreeMap<_, Vec<_>>, _) = (BTreeMap::new(), Vec::new());
     for array in all {
@@ -149,7 +150,7 @@ fn bounds(all: &[Variable]) -> HashSet<&str> {
     texts.flat_map(str::split_whitespace).collect()
 }
 
-/// Whether frames can be in it: numbers that have a place.
+/// Whether an array can hold frames: it has a supported number type, at least `least` axes, and no empty axis.
 fn is_volume(variable: &Variable, least: usize) -> bool {
     variable.sample.is_ok() && variable.lengths.len() >= least && !variable.lengths.contains(&0)
 }

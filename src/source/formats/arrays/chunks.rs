@@ -21,19 +21,19 @@ pub(super) struct Chunks {
     sample: StoredType,
     lengths: Vec<usize>,
     counts: Vec<Counts>,
-    /// Which of the array's frames is which; empty if they are in order.
+    /// Maps output frames to stored frames; empty if the orders agree.
     order: Vec<usize>,
     /// Frames that are in the same chunks.
     together: usize,
-    /// What is read at once along each axis: whole chunks, and no more than may be held.
+    /// The lengths of a piece that is read at once: whole chunks, as many as fit in memory.
     piece: Vec<usize>,
     opener: Opener,
 }
 
-/// Of what a program may take, chunks as they are decoded have about this part.
+/// Decoded chunks may use 1/16 of the memory budget.
 const SHARE: usize = 16;
 
-/// How often what is read is in memory at once: as the library's numbers, and as bytes.
+/// Copies of a piece in memory at once: the library's numbers, and the bytes.
 const COPIES: usize = 2;
 
 /// The error of a chunk that is too large.

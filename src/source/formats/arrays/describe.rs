@@ -16,7 +16,7 @@ const MOST_BYTES_TOGETHER: usize = 14 << 20;
 /// Values of an array for each frame that are kept.
 const MOST_PER_FRAME: usize = 64;
 
-/// Attributes that say how samples are stored. Samples are given as what they stand for.
+/// Attributes that describe how samples are stored. They are not kept, because samples are decoded by them.
 const OF_STORAGE: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "_Unsigned"];
 
 /// Attributes with stored numbers, which are others than the samples of packed arrays.
@@ -68,7 +68,7 @@ impl Builder<'_> {
                 Counts::Only(_) if variable.lengths[axis] == 1 => AxisRole::Single,
                 Counts::Only(_) => continue,
             };
-            // axes without names are told apart, though they may be of one length
+            // axes without names get dimensions of their own, even if their lengths are equal
             let dimension = self.new_dimension(&variable.dims[axis], variable.lengths[axis]);
             self.found.axes.push(ArrayAxis { dimension, role, reversed: (self.samples.backwards)(*counts) });
         }
@@ -142,7 +142,7 @@ impl Builder<'_> {
         other.path != variable.path && group(variable).starts_with(&group(other)) && is_named && is_small && is_read
     }
 
-    /// The values of an array; at the chosen index along an axis of which only one is meant.
+    /// The values of an array. Along an axis with a chosen index, only the values at that index.
     fn values(&self, variable: &Variable) -> Parsed<Values> {
         let Samples { times, .. } = self.samples;
         if *times == Some(variable.path.as_str()) {
@@ -190,7 +190,7 @@ fn held_bytes(values: &Values) -> usize {
     }
 }
 
-/// Whether an attribute is not one by which the libraries of NetCDF and HDF5 keep their own order.
+/// Whether an attribute is the user's, and not one that the NetCDF and HDF5 libraries write for their own use.
 fn is_users(attribute: &Attribute) -> bool {
     const INTERNAL: [&str; 8] = [
         "CLASS",

@@ -175,7 +175,7 @@ fn variable(dataset: &Dataset, path: String) -> Variable {
     Variable { path, sample, lengths, dims, chunk, attributes: attributes(&dataset.attributes()) }
 }
 
-/// What is said of an object; what is neither a text nor numbers is left out.
+/// The attributes of an object; those that are neither texts nor numbers are left out.
 fn attributes(all: &[hdf5_reader::Attribute]) -> Attributes {
     let value = |attribute: &hdf5_reader::Attribute| match &attribute.datatype {
         Datatype::FixedPoint { .. } | Datatype::FloatingPoint { .. } => {

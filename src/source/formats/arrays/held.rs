@@ -37,7 +37,7 @@ pub struct NamedArray {
     pub ty: ArrayType,
     /// Its dimensions, the slowest first.
     pub dimensions: Vec<description::Dimension>,
-    /// Lengths of the pieces that are best read together, if there are such.
+    /// Chunk lengths, if reading whole chunks is fastest.
     pub chunk: Option<Vec<usize>>,
     /// Its attributes.
     pub attributes: Vec<description::Attribute>,
@@ -66,7 +66,7 @@ impl ArrayType {
 /// The name of the format: the arrays and attributes are those that a NetCDF file would have.
 const FORMAT: &str = "NetCDF";
 
-/// Reads what arrays say of the frames of the variable that is meant. Messages call them `name`.
+/// Describes the frames of the chosen variable of some arrays. Messages call the arrays `name`.
 pub(in crate::source) fn describe(
     name: &Path,
     arrays: &Arc<dyn NamedArrays>,
@@ -204,7 +204,7 @@ mod tests {
     use crate::base::grid::Region;
     use crate::source::{open_arrays, read_frames};
 
-    /// Samples (time, lev, lat, lon), of which lat descends; the sample at i is i.
+    /// Samples (time, lev, lat, lon) with descending lat; the sample at i is i.
     struct Ocean;
 
     const LENGTHS: [(&str, u64); 4] = [("time", 3), ("lev", 2), ("lat", 3), ("lon", 2)];

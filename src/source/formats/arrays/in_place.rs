@@ -1,4 +1,4 @@
-//! Arrays whose numbers are in the file as they are: they are not decoded, but read where they lie.
+//! Arrays stored uncompressed: they are read in place, without decoding.
 
 use super::{Axis, Counts, Layout, Parsed, Stored, StoredType};
 
@@ -7,14 +7,14 @@ use super::{Axis, Counts, Layout, Parsed, Stored, StoredType};
 pub(super) struct InPlace {
     /// The first byte.
     pub(super) start: u64,
-    /// Bytes from an index of the first axis to the next, if others lie between them.
+    /// Bytes from one index of the first axis to the next, if other data lie in between.
     pub(super) record: Option<u64>,
     /// Whether numbers have their most significant byte first.
     pub(super) big_endian: bool,
 }
 
 impl InPlace {
-    /// How numbers of these axes are stored, all of which must be within so many bytes of the file.
+    /// The storage of an array with these axes. All its numbers must be within the `file` bytes of the file.
     pub(super) fn stored(self, axes: Vec<Axis>, ty: StoredType, file: u64) -> Parsed<Stored> {
         let Some(first) = axes.first().copied() else { return Err("an array without axes is no volume".into()) };
         let mut stored = Stored::new(&Layout(axes), ty, self.big_endian)?;

@@ -56,7 +56,7 @@ struct Variable {
     lengths: Vec<usize>,
     /// Name of each axis; empty where it has none.
     dims: Vec<String>,
-    /// Lengths of the pieces that are packed together, if it is in such.
+    /// Chunk lengths, if it is stored in chunks.
     chunk: Option<Vec<usize>>,
     attributes: Attributes,
 }
@@ -155,7 +155,7 @@ trait ArrayFile: Send {
         false
     }
 
-    /// Where the numbers of an array are, if they are in the file as they are.
+    /// Where the numbers of an array are, if they are stored uncompressed.
     fn in_place(&self, path: &str) -> Option<InPlace> {
         let _ = path;
         None
@@ -180,7 +180,7 @@ struct ReadConfig {
 /// Opens a file of one format, or what the caller holds.
 type OpenFile = Arc<dyn Fn(&Path, ReadConfig) -> Result<Box<dyn ArrayFile>> + Send + Sync>;
 
-/// What opens a file of arrays, as often as it is asked.
+/// Opens a file of arrays, any number of times.
 #[derive(Clone)]
 struct Opener {
     path: PathBuf,
@@ -222,7 +222,7 @@ pub(super) struct ArrayArchive {
     format: &'static str,
     opener: Opener,
     file: Box<dyn ArrayFile>,
-    /// The file whose state says whether the archive was changed; none if the caller holds the arrays.
+    /// The file whose state shows whether the archive was changed; `None` if the caller holds the arrays.
     watched: Option<PathBuf>,
 }
 
@@ -282,7 +282,7 @@ impl ArrayArchive {
         Ok(choose::undecided(&all, active(image.as_ref())))
     }
 
-    /// Reads what the variable that is meant says of its frames.
+    /// Describes the frames of the chosen variable.
     pub(super) fn describe(&self, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
         let (path, state) = (self.opener.path.as_path(), self.state()?);
         let refused = |e| Error::input(path, e);
@@ -385,7 +385,7 @@ struct Context<'a> {
     index: Option<usize>,
     /// What axes count, by the user's word.
     axes: Option<&'a str>,
-    /// Whether the user says how far voxels are apart.
+    /// Whether the user gave the spacing of voxels.
     spaced: bool,
     /// What to read beside the samples.
     extent: Extent,
@@ -396,9 +396,9 @@ struct ResolvedArray {
     variable: Variable,
     name: String,
     counts: Vec<Counts>,
-    /// Of all axes but those of which only one index is meant.
+    /// The layout of the axes that are read in full (fixed-index axes left out).
     layout: Layout,
-    /// Which of the array's frames is which; empty if they are in order.
+    /// Maps output frames to stored frames; empty if the orders agree.
     order: Vec<usize>,
     places: Places,
     values: Values,
@@ -441,7 +441,7 @@ impl Context<'_> {
         Ok(ResolvedArray { name, counts, layout, order, places, values, variable, description })
     }
 
-    /// What the file says of an array beside its samples. Notes name what is too large to be kept.
+    /// The description of an array. Notes name the parts that are too large to be kept.
     fn described(&self, variable: &Variable, counts: &[Counts], values: &Values, places: &mut Places) -> Description {
         let samples = describe::Samples {
             variable,
@@ -458,7 +458,7 @@ impl Context<'_> {
         description
     }
 
-    /// What VTKHDF says of places, and the order of frames.
+    /// Takes spacing, origin and times from VTKHDF; returns the order of frames.
     fn of_image(&self, variable: &Variable, layout: &Layout, places: &mut Places) -> Parsed<Vec<usize>> {
         let Some(image) = &self.image else { return Ok(Vec::new()) };
         image.check(layout.dims(), variable)?;

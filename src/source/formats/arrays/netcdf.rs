@@ -53,7 +53,7 @@ impl ArrayFile for NetCdfArrayFile {
     }
 
     fn read(&self, path: &str, _: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
-        // The stored type, whose bytes are those of the samples even where these are said to be unsigned.
+        // The stored type. Its bytes are the same if the samples are declared unsigned.
         let stored = stored_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype(), false)?;
         let of = |r: &Range<usize>| NcSliceInfoElem::Slice { start: r.start as u64, end: r.end as u64, step: 1 };
         let slice = NcSliceInfo { selections: ranges.iter().map(of).collect() };

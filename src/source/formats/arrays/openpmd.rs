@@ -12,7 +12,7 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
-    /// None if nothing like that is said of an array, nor of the group of its components.
+    /// `None` if neither the array nor the group of its components has the attributes of a mesh.
     pub(super) fn of(file: &dyn ArrayFile, variable: &Variable) -> Option<Self> {
         let parent = variable.path.rsplit_once('/').map_or("", |(parent, _)| parent);
         let says = |attributes: &Attributes| attributes.contains_key("axisLabels");

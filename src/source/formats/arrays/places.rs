@@ -41,7 +41,7 @@ pub(super) struct Places {
     pub(super) notes: Vec<Note>,
 }
 
-/// What the coordinates of an axis come to.
+/// A summary of the coordinates of an axis.
 #[derive(Debug, Clone)]
 struct AxisCoordinates {
     /// Name of the axis.
@@ -147,7 +147,7 @@ impl Places {
     }
 }
 
-/// The numbers of a coordinate, which are no more than an axis can have.
+/// The numbers of a coordinate; an error if there are more than an axis can have.
 pub(super) fn numbers(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Vec<f64>> {
     match coordinate.lengths.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)) {
         Some(count) if count <= MOST => file.numbers(&coordinate.path),
@@ -198,7 +198,7 @@ impl AxisCoordinates {
         Some(Self { name, first: at[0], step, backwards, is_regular, unit })
     }
 
-    /// A note on an axis whose lengths do not compare with those of the leading one.
+    /// A note on an axis whose unit is not comparable with that of the leading axis.
     fn other_unit(&self, leading: &Self) -> Note {
         let uneven = if self.is_regular { "" } else { " and not regular" };
         let text = format!(

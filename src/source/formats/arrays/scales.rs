@@ -46,7 +46,7 @@ fn has_coordinates(scale: &Variable) -> bool {
     !scale.text("NAME").unwrap_or_default().starts_with(NO_COORDINATES)
 }
 
-/// The first scale of each axis; nothing of what is damaged.
+/// The address of the first scale of each axis; `None`, or an empty list, if the references are damaged.
 fn addresses(dataset: &Dataset, size: u8) -> Vec<Option<u64>> {
     let Ok(list) = dataset.attribute("DIMENSION_LIST") else { return Vec::new() };
     let first = |entry: &[u8]| {

@@ -33,7 +33,7 @@ impl Values {
             valid: valid(variable, stored),
             missing,
         };
-        // What stands for missing ones among integers of 64 bits may be none of 32.
+        // The missing value of 64-bit integers may not fit in a 32-bit sample.
         let fits = packing.missing.iter().all(|value| !ty.is_wide() || sample::round_to(stored, *value) == *value);
         let is_plain = fits
             && packing.missing.len() < 2
@@ -57,7 +57,7 @@ fn as_stored(stored: SampleType, value: f64) -> f64 {
     if stored.is_float() { sample::round_to(stored, value) } else { value }
 }
 
-/// The least and the largest stored number that is valid; what is no number is no limit.
+/// The smallest and the largest valid stored number. NaN sets no limit.
 fn valid(variable: &Variable, stored: SampleType) -> (f64, f64) {
     let (lo, hi) = match *variable.numbers("valid_range") {
         [lo, hi] => (Some(lo), Some(hi)),

@@ -93,7 +93,7 @@ impl Data<'_> {
         checked.map(|()| start).map_err(refused)
     }
 
-    /// Frames of which each slice along z is a file.
+    /// Frames whose slices along z are files of their own.
     fn slices(&self, paths: &mut dyn Iterator<Item = PathBuf>) -> Result<Part> {
         let [x, y, z] = self.samples.lengths;
         let stored = self.samples.stored(1).map_err(|e| Error::input(self.file.path(), e))?;

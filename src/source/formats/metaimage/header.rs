@@ -17,7 +17,8 @@ pub(super) struct MetaImageHeader {
 }
 
 impl MetaImageHeader {
-    /// Reads a header that these bytes start with; none if it goes on after them, unless they are the `whole` file.
+    /// Reads the header at the start of these bytes. `None` if the header continues beyond them; if they are the
+    /// `whole` file, it must end within them.
     pub(super) fn parse(bytes: &[u8], whole: bool) -> Parsed<Option<Self>> {
         let mut header = Self::default();
         for line in bytes.split_inclusive(|b| *b == b'\n') {

@@ -38,7 +38,8 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     Ok(FileHeader { spacing, origin, times, variable, notes, description, ..FileHeader::plain(shape, parts) })
 }
 
-/// The directions of the axes, and what else the header says; none if that is nothing.
+/// The directions of the axes and the other fields of the header; `None` if the axes are plain and there are no other
+/// fields.
 fn description(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<Option<Description>> {
     let axes = [Axis::new(Counts::Frames, samples.frames)].into_iter().filter(|_| samples.axes == 4);
     let layout = Layout(axes.chain(samples.placed.voxels(samples.lengths)).collect());
@@ -204,7 +205,7 @@ fn per_axis(header: &MetaImageHeader, names: &[&str], default: f64, axes: usize)
     header.any(names).map_or_else(|| Ok(vec![default; axes]), |text| numbers(text, names[0], axes))
 }
 
-/// What the header says and nothing is done about.
+/// Notes on fields of the header that are ignored.
 fn unheeded(header: &MetaImageHeader, axes: usize) -> Parsed<Vec<Note>> {
     let mut notes = Vec::new();
     let matrix = matrix(header, axes)?;

@@ -82,7 +82,7 @@ struct NiftiSamples {
     ty: StoredType,
     packing: Option<Packing>,
     components: usize,
-    /// What is known but not where the samples are.
+    /// The properties that do not depend on where the samples are.
     known: Placement,
 }
 

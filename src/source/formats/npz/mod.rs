@@ -1,5 +1,5 @@
-//! NumPy's `.npz`: a zip archive of `.npy` files. Arrays whose names differ in a number are frames one after another;
-//! of other arrays one is meant. What is not compressed is read in place.
+//! NumPy's `.npz`: a zip archive of `.npy` files. Arrays whose names differ only in a number are consecutive frames;
+//! otherwise the user chooses one array. Uncompressed arrays are read in place.
 
 mod directory;
 
@@ -15,10 +15,10 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
-/// What stands for the number in the names of arrays that are frames.
+/// The placeholder for the number in the names of arrays that are frames.
 const STEP: &str = "%T";
 
-/// Reads the directory and the headers of all arrays, and checks the sizes of those that are meant.
+/// Reads the directory and the headers of all arrays, and checks the sizes of the chosen ones.
 pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let file = FileBytes::open(path, Access::Read)?;
     let variables = all(&file)?;
@@ -106,7 +106,8 @@ fn header(file: &FileBytes, member: &Member) -> Result<Array> {
     }
 }
 
-/// Arrays whose names differ in the number at the end alone are one variable, if they are of one shape and type.
+/// Groups arrays into variables: arrays whose names differ only in the number at the end are one variable, if they have
+/// the same shape and type.
 fn grouped(found: Vec<Found>) -> Vec<Variable> {
     let (mut numbered, mut variables): (BTreeMap<String, Vec<(u64, Found)>>, _) = (BTreeMap::new(), Vec::new());
     let single = |found: Found| Variable { name: found.name.clone(), arrays: vec![found], steps: Vec::new() };

@@ -10,13 +10,13 @@ use crate::source::formats::shared::words::{list, numbers};
 #[derive(Debug)]
 pub(super) struct Axes {
     pub(super) sizes: Vec<usize>,
-    /// Those of x, y, z.
+    /// The axes of x, y, z.
     pub(super) voxels: [usize; 3],
-    /// That of frames.
+    /// The axis of frames.
     pub(super) frames: Option<usize>,
-    /// That of what a voxel has several of.
+    /// The axis that holds the components of a voxel.
     pub(super) components: Option<usize>,
-    /// A step along each axis, where the file says so: in the world, or none for what lies not there.
+    /// The step along each axis in the world, if the file states it; `None` for an axis that is not in space.
     directions: Option<Vec<Option<Vec<f64>>>>,
 }
 
@@ -52,7 +52,7 @@ impl Axes {
         Ok(Self { sizes, voxels: [x, y, z], frames, components, directions })
     }
 
-    /// How many there are along an axis that may not be there.
+    /// The length of an axis; 1 if there is no such axis.
     pub(super) fn len(&self, axis: Option<usize>) -> usize {
         axis.map_or(1, |axis| self.sizes[axis])
     }

@@ -148,7 +148,7 @@ impl Skip {
         start.ok_or_else(|| Error::input(file.path(), "byte skip is too large"))
     }
 
-    /// Where a compressed stream starts, and bytes to leave out of what it holds.
+    /// Where a compressed stream starts, and the number of decompressed bytes to skip.
     fn compressed(&self, file: &FileBytes, header: u64) -> Result<(u64, u64)> {
         let skip = self.bytes.ok_or_else(|| Error::input(file.path(), "byte skip -1 is for raw samples alone"))?;
         Ok((after_lines(file, header, self.lines)?, skip))

@@ -29,7 +29,7 @@ impl DataFiles {
         }
     }
 
-    /// Axes of what one file holds, if that is said.
+    /// The number of axes that each file holds, if the header states it.
     pub(super) fn axes(&self) -> Option<usize> {
         match self {
             Self::One(_) => None,

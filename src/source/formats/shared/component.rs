@@ -29,8 +29,8 @@ pub(in crate::source) fn chosen(name: &str, components: usize, index: Option<usi
     }
 }
 
-/// Which component of a file's only array the option `variable` means, and what that is called. An array without a name
-/// is called `samples` where it needs one.
+/// Finds the component of a file's only array that the option `variable` means, and its name. If an array without a
+/// name needs one, it is `samples`.
 pub(in crate::source) fn of_only(
     own: Option<&str>,
     components: usize,
@@ -87,8 +87,7 @@ pub(in crate::source) fn choose(
     Ok(Chosen { array, component: chosen(name, components, index)? })
 }
 
-/// Whether [`choose`] finds neither which array nor which component of it is meant, unless the option `variable` names
-/// them.
+/// Whether [`choose`] cannot choose an array and its component without the option `variable`.
 pub(in crate::source) fn is_undecided(arrays: &[(&str, usize)], active: Option<usize>) -> bool {
     match (active, arrays) {
         (_, []) => false,
@@ -98,7 +97,7 @@ pub(in crate::source) fn is_undecided(arrays: &[(&str, usize)], active: Option<u
     }
 }
 
-/// What a component is called: as its array, if this has no other.
+/// The name of a component: that of its array, if the array has only one.
 pub(in crate::source) fn label(name: &str, components: usize, component: usize) -> String {
     if components == 1 { name.into() } else { format!("{name}[{component}]") }
 }

@@ -23,7 +23,7 @@ const MOST: u64 = 1032; // bytes that one compressed byte can stand for
 pub(in crate::source) enum Compression {
     Gzip,
     Zlib,
-    /// Without a header; what it holds has this CRC-32.
+    /// Without a header. The decompressed bytes have this CRC-32.
     Deflate {
         checksum: u32,
     },
@@ -35,7 +35,7 @@ pub(in crate::source) struct Place {
     pub(in crate::source) compression: Compression,
     /// Where the stream starts in the file.
     pub(in crate::source) start: u64,
-    /// Bytes of what the stream holds that come before the first frame.
+    /// Decompressed bytes before the first frame.
     pub(in crate::source) skip: u64,
     /// Frames that lie together.
     pub(in crate::source) together: usize,
@@ -51,7 +51,7 @@ pub(in crate::source) struct Stream {
     pub(in crate::source) compression: Compression,
     /// Where it starts in the file.
     pub(in crate::source) start: u64,
-    /// Bytes of what it holds that come before the array; fewer than 2^63.
+    /// Decompressed bytes before the array; fewer than 2^63.
     pub(in crate::source) skip: u64,
 }
 
@@ -80,7 +80,7 @@ impl Stream {
     }
 }
 
-/// Decodes what is at such a place.
+/// Decodes the frames at a [`Place`].
 pub(in crate::source) struct Deflated {
     place: Place,
     /// Bytes that the stream holds after the last frame.
@@ -110,12 +110,12 @@ impl Deflated {
 }
 
 impl Compression {
-    /// What is decompressed of a file from this byte on.
+    /// Decompresses a file from the byte `start` on.
     pub(in crate::source) fn open(self, path: &Path, start: u64) -> Result<Box<dyn Read + Send>> {
         Ok(self.reader(FileReader::new(FileBytes::open(path, Access::Read)?, start)))
     }
 
-    /// What is decompressed of a reader.
+    /// Decompresses a reader.
     pub(in crate::source) fn reader(self, reader: impl Read + Send + 'static) -> Box<dyn Read + Send> {
         let reader = BufReader::with_capacity(64 << 10, reader);
         match self {
@@ -137,7 +137,7 @@ impl Compression {
     }
 }
 
-/// What a reader gives, with an error at its end if its checksum is wrong.
+/// Passes on the bytes of a reader, with an error at its end if the checksum is wrong.
 struct Checked<R> {
     reader: R,
     crc: Crc,
@@ -193,8 +193,8 @@ pub(in crate::source) fn check_room(compressed: u64, bytes: u64) -> Parsed<()> {
     Err(format!("expected {bytes} bytes of what it holds, but {compressed} compressed bytes cannot be so many"))
 }
 
-/// Puts what comes from a reader into its place, from `at` on up to `bytes`, and says how many came. `failed` makes an
-/// error of that of reading after some bytes.
+/// Copies up to `bytes` bytes from a reader into `out` from `at` on, and returns how many there were. `failed` converts
+/// an error of reading, given the number of bytes read before it.
 pub(in crate::source) fn hold(
     reader: &mut dyn Read,
     path: &Path,

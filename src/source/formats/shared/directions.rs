@@ -5,13 +5,13 @@ use crate::base::error::Note;
 use crate::source::Parsed;
 use crate::source::layout::{Axis, Counts, Layout};
 
-/// What is taken as straight: a part of a step so small does not show.
+/// Deviations from an axis by less than this share of a step count as straight: they are not visible.
 const SLANT: f64 = 1e-3;
 
 /// Axes of voxels in the world.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::source) struct Directions {
-    /// Of each axis of the array, the fastest first; of any length.
+    /// The direction of each axis of the array, the fastest first. Its length is arbitrary.
     directions: [[f64; 3]; 3],
     /// A step along each axis is its direction times this.
     spacing: [f64; 3],
@@ -33,8 +33,8 @@ pub(in crate::source) struct Placed {
 }
 
 impl Directions {
-    /// Steps of these lengths along axes that go in these directions. Lengths below 0 are refused: they would turn an
-    /// axis once more, or would be meant to.
+    /// Steps of these lengths along axes in these directions. Negative lengths are refused, because it is unclear
+    /// whether they should reverse an axis.
     pub(in crate::source) fn of(directions: [[f64; 3]; 3], spacing: [f64; 3], first: [f64; 3]) -> Parsed<Self> {
         if spacing.iter().any(|step| *step < 0.0) {
             return Err(format!("has the spacing {spacing:?}, which is not positive"));

@@ -1,4 +1,4 @@
-//! Frames that are put together from pieces: boxes of voxels, each of which is decoded from its first byte to its last.
+//! Frames assembled from pieces. A piece is a box of voxels that is decoded from its first byte to its last.
 
 use super::deflated::{Compression, FileReader, expect_end, hold};
 use crate::base::error::{Error, Result};
@@ -12,16 +12,16 @@ use std::path::{Path, PathBuf};
 
 /// The samples of a piece in their file.
 pub(in crate::source) trait Packed: Debug + Send {
-    /// All of them, x fastest.
+    /// Reads all samples of the piece, x fastest.
     fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>>;
 }
 
 /// Samples in a file, as they are or compressed.
 #[derive(Debug)]
 pub(in crate::source) struct Stream {
-    /// Where they start in the file, or the stream does that they are in.
+    /// Where the samples start in the file, or the compressed stream that holds them.
     pub(in crate::source) start: u64,
-    /// Bytes of what a compressed stream holds that come before them.
+    /// Decompressed bytes before the samples, in a compressed stream.
     pub(in crate::source) skip: u64,
     pub(in crate::source) bytes: usize,
     pub(in crate::source) compression: Option<Compression>,

@@ -93,7 +93,7 @@ impl Numbers {
     }
 }
 
-/// Appends the bytes of a number, the least significant one first; none if it is none that its type can hold.
+/// Appends the bytes of a number, the least significant one first; `None` if it is no number that its type can hold.
 fn append(word: &[u8], ty: StoredType, bytes: &mut Vec<u8>) -> Option<()> {
     let text = std::str::from_utf8(word).ok()?;
     match ty {

@@ -1,5 +1,5 @@
-//! TIFF: the pages of a file are the planes of a volume along z. What OME-XML or ImageJ says in the first page makes
-//! frames and channels of them.
+//! TIFF: the pages of a file are the planes of a volume along z. OME-XML or ImageJ's text in the first page divides
+//! them into frames and channels.
 
 mod imagej;
 mod ome;
@@ -20,7 +20,7 @@ use std::fmt;
 use std::ops::Range;
 use std::path::Path;
 
-/// What is decoded at once may take one part in so many of the memory for a window.
+/// The bytes decoded at once may use 1/4 of the memory for a window.
 const SHARE: usize = 4;
 
 /// Bytes that one compressed byte can stand for.

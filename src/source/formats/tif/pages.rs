@@ -34,13 +34,13 @@ const COMPRESSIONS: [(u16, &str, bool); 14] = [
     (50000, "Zstandard", false),
 ];
 
-/// What a page is made of.
+/// The size and the sample type of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Page {
     /// Pixels along x and y.
     pub(super) dims: [usize; 2],
     pub(super) ty: StoredType,
-    /// Those of a strip or tile, which may go beyond the page.
+    /// Pixels of a strip or tile along x and y; it may extend beyond the page.
     chunk: [usize; 2],
 }
 
@@ -104,7 +104,7 @@ impl Pages {
         })
     }
 
-    /// How many pages there are, from this one on, all of which must be alike. Then it is at the first again.
+    /// Counts the pages after this one, including it, and checks that they are alike. Then returns to the first page.
     pub(super) fn count(&mut self, first: &Page) -> Result<usize> {
         let mut count = 1;
         while self.decoder.more_images() {

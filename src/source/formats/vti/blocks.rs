@@ -1,11 +1,11 @@
-//! Arrays in blocks, each of which is compressed by zlib.
+//! Arrays in blocks that are compressed by zlib one by one.
 
 use super::count::Count;
 use crate::source::formats::shared::words::wrong;
 use flate2::bufread::ZlibDecoder;
 use std::io::{self, BufReader, Read, Take};
 
-/// What stands before the blocks of an array.
+/// The header before the blocks of an array.
 #[derive(Debug)]
 pub(super) struct Blocks {
     /// Bytes of each block but the last.
@@ -17,7 +17,7 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Reads what stands before an array of `expected` bytes, of which no more than `left` can be stored.
+    /// Reads the header of an array of `expected` bytes. `left` is an upper bound on the stored bytes.
     pub(super) fn read(reader: &mut dyn Read, count: Count, expected: usize, left: u64) -> io::Result<Self> {
         let [blocks, block, last] = [count.read(reader)?, count.read(reader)?, count.read(reader)?];
         let last = if last == 0 { block } else { last };
@@ -33,13 +33,13 @@ impl Blocks {
         Ok(Self { block, last, packed })
     }
 
-    /// Bytes that are stored, those that stand before them included; none if too many to count.
+    /// Stored bytes of the blocks and their header; `None` on overflow.
     pub(super) fn stored(&self, count: Count) -> Option<u64> {
         let before = (self.packed.len() as u64 + 3) * count.size() as u64;
         self.packed.iter().try_fold(before, |sum, bytes| sum.checked_add(*bytes))
     }
 
-    /// What the blocks that come next in a reader hold.
+    /// Decompresses the blocks that follow in a reader.
     pub(super) fn inflate<R: Read>(self, reader: R) -> Inflated<R> {
         Inflated { next: 0, left: 0, blocks: self, between: Some(reader), inside: None }
     }
@@ -55,7 +55,7 @@ pub(super) struct Inflated<R> {
 }
 
 impl<R: Read> Inflated<R> {
-    /// Goes on to the next block; false if there is none.
+    /// Starts the next block; false if there is none.
     fn advance(&mut self) -> io::Result<bool> {
         let Some(packed) = self.blocks.packed.get(self.next) else { return Ok(false) };
         self.next += 1;
@@ -65,7 +65,7 @@ impl<R: Read> Inflated<R> {
         Ok(true)
     }
 
-    /// Checks that a block holds no more, and goes past it.
+    /// Checks that a block has no more bytes, and skips to its end.
     fn finish(&mut self, mut block: ZlibDecoder<BufReader<Take<R>>>) -> io::Result<()> {
         if block.read(&mut [0])? > 0 {
             return Err(wrong(format!("block {} holds more than it should", self.next - 1)));

@@ -12,7 +12,7 @@ impl Extent {
         (self.0[2 * axis], self.0[2 * axis + 1])
     }
 
-    /// Whether it has no point: so VTK writes pieces of which nothing is left.
+    /// Whether it has no point. VTK writes empty pieces in this way.
     pub(super) fn is_empty(&self) -> bool {
         [0, 1, 2].map(|axis| self.ends(axis)).iter().any(|(first, last)| first > last)
     }

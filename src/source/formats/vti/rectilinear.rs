@@ -1,4 +1,4 @@
-//! Where the points of a rectilinear grid are: by three lists of coordinates, of which each piece has its part.
+//! The positions of the points of a rectilinear grid: three lists of coordinates. Each piece has its part of them.
 
 use super::extent::Extent;
 use super::header::{VtiArray, VtiPiece};

@@ -1,4 +1,4 @@
-//! The XML of a file without the samples that are text among it, which may be more than memory holds.
+//! The XML of a file without the samples that are stored in it as text, which may not fit in memory.
 
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
@@ -16,7 +16,7 @@ pub(super) struct Skeleton {
     /// Places in the text, and bytes that are left out before each.
     cuts: Vec<(u64, u64)>,
     left_out: u64,
-    /// Whether a `-` came, of which the next byte says whether it is a sign.
+    /// Whether the last byte was a `-`. The next byte shows whether it is the sign of a number.
     sign: bool,
     /// Bytes since the last `>`, if no `<` came.
     outside: Option<usize>,

@@ -43,7 +43,7 @@ pub(super) struct VtkHeader {
     /// Which of them are scalars.
     pub(super) scalars: Vec<usize>,
     pub(super) time: Option<f64>,
-    /// What the arrays that come are of, and how many tuples these have.
+    /// Whether the following arrays are of points or cells, and their number of tuples.
     inside: Option<(Association, usize)>,
 }
 
@@ -230,7 +230,7 @@ fn start(lines: &mut Lines<'_>) -> Result<bool> {
     }
 }
 
-/// The name of the colours of SCALARS, which come before these.
+/// Skips the line with the name of a colour table, which may precede the values of SCALARS.
 fn skip_table(lines: &mut Lines<'_>) -> Result<()> {
     if lines.peek(12)?.eq_ignore_ascii_case(b"LOOKUP_TABLE") {
         lines.line()?;
@@ -238,13 +238,13 @@ fn skip_table(lines: &mut Lines<'_>) -> Result<()> {
     Ok(())
 }
 
-/// What VTK says of an array after it: lines up to an empty one.
+/// Skips the metadata that VTK writes after an array: the lines up to an empty one.
 fn skip_metadata(lines: &mut Lines<'_>) -> Result<()> {
     while lines.line()?.is_some_and(|line| !line.trim().is_empty()) {}
     Ok(())
 }
 
-/// The bits of a number of a type; none if its name says nothing of them.
+/// The number of bits of a type; `None` if the type is not known.
 fn bits_of(ty: &str) -> Option<usize> {
     Some(match ty.to_lowercase().as_str() {
         "bit" => 1,

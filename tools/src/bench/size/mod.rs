@@ -61,7 +61,7 @@ pub struct Config {
     pub peers: Option<Peers>,
     /// The folder of results.
     pub output: PathBuf,
-    /// `wavesplat-tools` itself, whose `bench-step` measures.
+    /// The path of `wavesplat-tools`, which measures with its command `bench-step`.
     pub program: PathBuf,
     /// The day to write into the results; by default that of the clock.
     pub date: Option<String>,

@@ -1,4 +1,4 @@
-//! What is measured of an archive: a list of tasks, each with the key under which its result is found.
+//! The measurements of an archive: a list of tasks, each with the key of its result.
 
 use super::convert::{Conversion, Scheme};
 use super::view::{Method, View};
@@ -21,7 +21,7 @@ impl Coded {
         format!("{} {:e}", self.scheme.name(), self.tolerance)
     }
 
-    /// What the program lets splatting add by default.
+    /// The program's default splat error.
     fn splat_error(&self) -> f64 {
         default_splat_error(Some(self.tolerance))
     }

@@ -27,7 +27,7 @@ pub struct Results {
     pub rows: Vec<Row>,
 }
 
-/// What was measured of an archive.
+/// The measurements of an archive.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Archive {
     /// The archive.
@@ -38,7 +38,7 @@ pub struct Archive {
     pub missing: BTreeMap<String, String>,
 }
 
-/// A number that is to be reached, and what was.
+/// A target, and the number that was reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// What is compared.
