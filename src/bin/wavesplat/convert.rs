@@ -79,8 +79,8 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     missing_value: Option<f64>,
     /// For --bound relative: samples smaller than this may be off by as much as a sample of this size. Choose the
-    /// magnitude below which values do not matter. With 0, zeros are kept exactly, and values near zero take most of
-    /// the file [default: 0]
+    /// magnitude below which values do not matter. With 0, zeros must come back as zeros, and values near zero take most
+    /// of the file [default: 0]
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     floor: Option<f64>,
     /// For --bound sampled: number of random pixels on each of three faces [default: 300]
