@@ -37,10 +37,12 @@ impl Lookup {
         }
         lookup.push(None); // the share 1 itself
         for (point, _) in map.colour_points() {
-            // Colours are linear up to this point, and from it on.
-            let step = ((point * STEPS as f64) as usize).min(STEPS);
-            let sides = [point.next_down(), point, point.next_up()].map(|share| both_sides(map, share));
-            lookup[step] = lookup[step].filter(|colour| sides.iter().all(|side| *side == Some(*colour)));
+            // Colours are linear up to this point, and from it on. It may lie between two steps.
+            let sides = [point.next_down(), point, point.next_up()];
+            let colours = sides.map(|share| both_sides(map, share));
+            for step in sides.map(|share| ((share * STEPS as f64) as usize).min(STEPS)) {
+                lookup[step] = lookup[step].filter(|colour| colours.iter().all(|side| *side == Some(*colour)));
+            }
         }
         Self::Exact(lookup)
     }
@@ -100,6 +102,16 @@ mod tests {
             let map = TransferFunction::of_points(points.clone(), space, None, None).expect("a map");
             is_exact(&map); // 0.1, 0.3 and 0.5 lie between two levels, so few colours are looked up
         }
+    }
+
+    #[test]
+    fn jumps_between_steps_are_exact() {
+        let grey = |points: &[(f64, f64)]| {
+            let points = points.iter().map(|(share, level)| (*share, [*level; 3])).collect();
+            is_exact(&TransferFunction::of_points(points, ColourSpace::Rgb, None, None).expect("a map"));
+        };
+        grey(&[(0.0, 0.2), (0.49995, 0.2), (0.5, 0.9), (0.5, 0.2), (1.0, 0.2)]);
+        grey(&[(0.0, 0.0), (0.25, 64.502 / 255.0), (0.25, 64.2 / 255.0), (1.0, 1.0), (1.0, 0.3)]);
     }
 
     #[test]

@@ -191,9 +191,9 @@ impl<'a> Budget<'a> {
         let bands = of_views(&|setup| setup.backend.band_bytes(self.size[0], rows, planes.all));
         let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes.all)).max().unwrap_or(0);
         let threads = rayon::current_num_threads();
-        // A thread filters one plane in f64, out of place.
-        let filtered = if planes.doubles > 0 { threads } else { 0 };
-        bands + (planes.doubles + filtered) * self.double_bytes(rows) + threads * scratch * size_of::<f64>()
+        // A thread may begin a plane in f64 in each view before it sees that there is no room; and it filters one.
+        let more = threads * self.setups.len();
+        bands + (planes.doubles + more) * self.double_bytes(rows) + threads * scratch * size_of::<f64>()
     }
 
     /// Bytes of a plane in f64 of a band of `rows` rows, in the view where it takes most.
@@ -208,7 +208,7 @@ impl<'a> Budget<'a> {
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
-    /// The next band of rows to splat, from row `start` on: one of as few as fit, and of nearly the same height.
+    /// The next band of rows to splat: splits the rows from `start` on into as few bands as fit, of nearly equal height.
     pub(super) fn band(&self, layout: &Layout, start: usize) -> BandPlan {
         let left = self.size[1] - start;
         let rows = |tiles: usize| (tiles * TILE).min(left);
@@ -224,10 +224,8 @@ impl<'a> Budget<'a> {
         let used = self.used(layout, rows.len(), (blocks, 0));
         let planes = self.all_double(layout.planes());
         let left = self.available.saturating_sub(used) / self.double_bytes(rows.len()).max(1);
-        // Each thread may begin a plane before it sees that there is no room, and filters one.
-        let most = left.saturating_sub(rayon::current_num_threads()).min(planes.doubles);
         // The lowest band fits with all planes in f64.
-        let most = if rows.len() <= TILE { planes.doubles } else { most };
+        let most = if rows.len() <= TILE { planes.doubles } else { left.min(planes.doubles) };
         BandPlan { rows, blocks, room: DoubleRoom::new(most) }
     }
 
@@ -237,8 +235,8 @@ impl<'a> Budget<'a> {
         self.picture_bytes(layout.frames) + self.band_bytes(planes, rows) + blocks * self.block_bytes(planes.all)
     }
 
-    /// Notes how many planes of a band needed sums in f64, and returns the bytes that the whole plan allows. Of a band that
-    /// had too little room, only some planes have been seen: then the next one gets room for twice as many.
+    /// Notes how many planes of a band needed sums in f64, and returns the bytes that the whole plan granted. Of a band
+    /// that had too little room, only some planes have been seen: then the next one gets room for twice as many.
     pub(super) fn note(&self, layout: &Layout, band: &BandPlan) -> usize {
         let seen = if band.room.is_exceeded() { 2 * band.room.used() } else { band.room.used() };
         self.doubles.fetch_max(seen, Relaxed);
@@ -247,7 +245,9 @@ impl<'a> Budget<'a> {
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     fn batch(&self, layout: &Layout, rows: usize) -> usize {
-        let used = self.used(layout, rows, (0, self.planes(layout.planes()).doubles));
+        let all = layout.planes();
+        let planes = if rows <= TILE { self.all_double(all) } else { self.planes(all) };
+        let used = self.used(layout, rows, (0, planes.doubles));
         // The lattice reads its blocks plane by plane, so few blocks stay in the caches.
         let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()
