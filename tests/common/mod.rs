@@ -2,6 +2,7 @@
 
 pub(crate) mod computed;
 pub(crate) mod exact;
+pub(crate) mod formula;
 pub(crate) mod http;
 pub(crate) mod memory;
 pub(crate) mod random;
