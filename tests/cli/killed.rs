@@ -66,6 +66,13 @@ impl Tally {
     fn is_telling(&self) -> bool {
         2 * self.hits > self.kills && 4 * self.went_on > self.rounds
     }
+
+    fn check(&self, started: Instant, rounds: usize) {
+        report(&format!("{self:?} in {:.1?}", started.elapsed()));
+        assert!(self.rounds >= rounds && self.kills >= rounds);
+        assert!(2 * self.hits > self.kills, "most kills came too late");
+        assert!(4 * self.went_on > self.rounds, "few runs had windows to continue from");
+    }
 }
 
 fn archive() -> Archive {
@@ -84,8 +91,7 @@ fn rounds(jobs: &[Job], rounds: usize, seed: u64) {
         let n = tally.rounds % jobs.len();
         tally.round(&jobs[n], &mut reach[n], &mut random);
     }
-    report(&format!("{tally:?} in {:.1?}", started.elapsed()));
-    assert!(tally.is_telling(), "{tally:?}");
+    tally.check(started, rounds);
 }
 
 #[test]
