@@ -8,8 +8,8 @@ use super::{Rgb, TransferFunction};
 pub(super) enum Lookup {
     /// Of a map with linear pieces: the colour of every step that has only one. Others are computed.
     Exact(Vec<Option<Rgb>>),
-    /// Of a slow map: the colours between steps, correct up to rounding.
-    Nearest(Vec<Rgb>),
+    /// Of a slow map: the colours at the steps, which are those between them up to rounding.
+    Nearest(Vec<Option<Rgb>>),
 }
 
 /// Number of steps. In the named maps, 2 to 7 % of the steps have several colours.
@@ -22,10 +22,10 @@ const SLOW_STEPS: usize = 1 << 13;
 const MARGIN: f64 = 1e-9;
 
 impl Lookup {
-    /// The colours of a map over 0 to 1. The background stands for colours that the map does not have.
-    pub(super) fn new(map: &TransferFunction, background: Rgb) -> Self {
+    /// The colours of a map over 0 to 1.
+    pub(super) fn new(map: &TransferFunction) -> Self {
         if map.is_slow() {
-            let colour = |n| map.colour(n as f64 / SLOW_STEPS as f64).map_or(background, bytes);
+            let colour = |n| map.colour(n as f64 / SLOW_STEPS as f64).map(bytes);
             return Self::Nearest((0..=SLOW_STEPS).map(colour).collect());
         }
         let mut lookup: Vec<Option<Rgb>> = Vec::with_capacity(STEPS + 1);
@@ -52,7 +52,7 @@ impl Lookup {
     pub(super) fn colour(&self, share: f64) -> Option<Rgb> {
         match self {
             Self::Exact(_) => self.exact(share),
-            Self::Nearest(colours) => colours.get((share * SLOW_STEPS as f64).round() as usize).copied(),
+            Self::Nearest(colours) => colours.get((share * SLOW_STEPS as f64).round() as usize).copied().flatten(),
         }
     }
 
@@ -78,7 +78,7 @@ mod tests {
 
     /// Compares every colour with the map's own, at shares of all kinds.
     fn is_exact(map: &TransferFunction) -> f64 {
-        let lookup = Lookup::new(map, [0; 3]);
+        let lookup = Lookup::new(map);
         let points: Vec<f64> = map.colour_points().iter().flat_map(|(p, _)| [p.next_down(), *p, p.next_up()]).collect();
         let even = (0..=100_000).map(|n| f64::from(n) / 1e5);
         let steps = (0..=STEPS).map(|n| n as f64 / STEPS as f64).flat_map(|s| [s.next_down(), s]);
@@ -118,7 +118,7 @@ mod tests {
     fn slow_maps_are_exact_up_to_rounding() {
         let points = vec![(0.0, [0.2, 0.3, 0.8]), (1.0, [0.7, 0.0, 0.1])];
         let map = TransferFunction::of_points(points, ColourSpace::Diverging, None, None).expect("two points");
-        let lookup = Lookup::new(&map, [0; 3]);
+        let lookup = Lookup::new(&map);
         for share in (0..=9999).map(|i| f64::from(i) / 9999.0) {
             let exact = bytes(map.colour(share).expect("a colour"));
             let found = lookup.colour(share).expect("every colour of a slow map");

@@ -104,7 +104,7 @@ impl Scale {
         }
         let map = map.over((0.0, 1.0))?;
         let normed = (norm.of(lo), norm.of(hi));
-        Ok(Self { lookup: Lookup::new(&map, background), map, range, normed, norm, background, clear: None })
+        Ok(Self { lookup: Lookup::new(&map), map, range, normed, norm, background, clear: None })
     }
 
     /// The same with values that show the background.
@@ -134,12 +134,12 @@ impl Scale {
             1.0 => self.lookup.exact(share),
             _ => None,
         };
-        looked_up.unwrap_or_else(|| bytes(self.faded(clear, value, share)))
+        looked_up.unwrap_or_else(|| bytes(self.faded(presence, share)))
     }
 
-    /// The colour of a value at a share of the range, over the background as far as it is clear.
-    fn faded(&self, clear: Clear, value: f64, share: f64) -> Colour {
-        let (background, presence) = (self.background.map(|c| f64::from(c) / 255.0), clear.presence(value));
+    /// The colour at a share of the range, over the background unless `presence` is 1 ([`Clear::presence`]).
+    fn faded(&self, presence: f64, share: f64) -> Colour {
+        let background = self.background.map(|c| f64::from(c) / 255.0);
         let full = self.map.colour(share).unwrap_or(background);
         std::array::from_fn(|i| background[i] + presence * (full[i] - background[i]))
     }
@@ -159,7 +159,7 @@ impl Scale {
         match *numbers {
             _ if numbers.iter().any(|n| n.is_nan()) => background(),
             [value] => match self.clear {
-                Some(clear) => self.faded(clear, f64::from(value), self.share(value)),
+                Some(clear) => self.faded(clear.presence(value.into()), self.share(value)),
                 None => self.map.colour(self.share(value)).unwrap_or_else(background),
             },
             [r, g, b] => [r, g, b].map(|c| self.share(c)),
@@ -186,8 +186,10 @@ impl Scale {
 
     /// The colour at a share of the range, 0 to 1.
     pub fn colour_at(&self, share: f64) -> Rgb {
-        self.clear
-            .map_or_else(|| self.full_colour_at(share), |clear| bytes(self.faded(clear, self.value(share), share)))
+        self.clear.map_or_else(
+            || self.full_colour_at(share),
+            |clear| bytes(self.faded(clear.presence(self.value(share)), share)),
+        )
     }
 
     /// The value at a share of the range.
