@@ -32,9 +32,10 @@ pub(super) fn splat_bands<T: Send, P: DerefMut<Target = [T]>>(
             .map(|view| BandAccumulator::new(view.setup, plan.rows.clone(), &layout).relative_to(view.weights.ones()))
             .collect();
         report.add_splatted(&splat(&mut bands, (&blocks, plan.blocks), &batch, &plan.room)?);
-        report.planned_bytes = report.planned_bytes.max(budget.note(&layout, &plan) as u64);
+        report.planned_bytes = report.planned_bytes.max(budget.granted_bytes(&layout, &plan) as u64);
+        budget.learn(&plan);
         if plan.room.is_exceeded() {
-            continue; // with more room, in a lower band
+            continue; // with more room: fewer rows, or fewer blocks at a time
         }
         start = plan.rows.end;
         let mut clock = Instant::now();

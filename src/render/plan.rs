@@ -221,7 +221,7 @@ impl<'a> Budget<'a> {
     /// The plan of a band of these rows.
     pub(super) fn plan(&self, layout: &Layout, rows: Range<usize>) -> BandPlan {
         let blocks = self.batch(layout, rows.len());
-        let used = self.used(layout, rows.len(), (blocks, 0));
+        let used = self.used(layout, rows.len(), blocks, 0);
         let planes = self.all_double(layout.planes());
         let left = self.available.saturating_sub(used) / self.double_bytes(rows.len()).max(1);
         // The lowest band fits with all planes in f64.
@@ -230,24 +230,28 @@ impl<'a> Budget<'a> {
     }
 
     /// Bytes for a band of `rows` rows, with some blocks decoded at a time and some planes in f64.
-    fn used(&self, layout: &Layout, rows: usize, (blocks, doubles): (usize, usize)) -> usize {
+    fn used(&self, layout: &Layout, rows: usize, blocks: usize, doubles: usize) -> usize {
         let planes = Planes { all: layout.planes(), doubles };
         self.picture_bytes(layout.frames) + self.band_bytes(planes, rows) + blocks * self.block_bytes(planes.all)
     }
 
-    /// Notes how many planes of a band needed sums in f64, and returns the bytes that the whole plan granted. Of a band
-    /// that had too little room, only some planes have been seen: then the next one gets room for twice as many.
-    pub(super) fn note(&self, layout: &Layout, band: &BandPlan) -> usize {
+    /// Learns from a splatted band how many planes need sums in f64. If it had too little room, it shows only some of
+    /// them: then the next band gets room for twice as many.
+    pub(super) fn learn(&self, band: &BandPlan) {
         let seen = if band.room.is_exceeded() { 2 * band.room.used() } else { band.room.used() };
         self.doubles.fetch_max(seen, Relaxed);
-        self.fixed + self.used(layout, band.rows.len(), (band.blocks, band.room.granted()))
+    }
+
+    /// Bytes that a splatted band had, with all that does not depend on bands.
+    pub(super) fn granted_bytes(&self, layout: &Layout, band: &BandPlan) -> usize {
+        self.fixed + self.used(layout, band.rows.len(), band.blocks, band.room.granted())
     }
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
     fn batch(&self, layout: &Layout, rows: usize) -> usize {
         let all = layout.planes();
         let planes = if rows <= TILE { self.all_double(all) } else { self.planes(all) };
-        let used = self.used(layout, rows, (0, planes.doubles));
+        let used = self.used(layout, rows, 0, planes.doubles);
         // The lattice reads its blocks plane by plane, so few blocks stay in the caches.
         let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()

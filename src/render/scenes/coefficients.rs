@@ -2,8 +2,9 @@
 //! once for all frames of a window (eq 9), and each pixel is inverted (eq 8). Decoded samples can be splatted instead
 //! (eq 4).
 
-use super::batch_plan::{BatchPlan, SplatSource, error_planes};
+use super::batch_plan::{BatchPlan, SplatSource};
 use super::coded::CodedBlock;
+use super::needs::FileNeeds;
 use super::overview;
 use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};
 use crate::base::error::Result;
@@ -23,12 +24,13 @@ use crate::render::scene::{
 };
 use crate::wavelet::Lane;
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_format::{BlockEntry, BlockStats, LeafEntry, PartEntry, PartKind};
+use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind};
 
 /// A coefficient file as a scene.
 pub struct CoefficientScene {
     file: Arc<CoefficientFile>,
     what: SplatSource,
+    needs: FileNeeds,
     /// The frame of each channel up to which parts of a remote file were fetched.
     fetched: Vec<usize>,
 }
@@ -37,7 +39,7 @@ impl CoefficientScene {
     /// A scene of an open file.
     pub fn new(file: impl Into<Arc<CoefficientFile>>, what: SplatSource) -> Self {
         let file = file.into();
-        Self { fetched: vec![0; file.channels()], file, what }
+        Self { fetched: vec![0; file.channels()], needs: FileNeeds::new(&file, what), file, what }
     }
 
     /// Fetches the bytes of a remote file that the next frames of a request need: all of the first window, and as many
@@ -69,27 +71,6 @@ impl CoefficientScene {
         self.file.fetch_gathered(&gathered)
     }
 }
-
-impl CoefficientScene {
-    fn windows(&self) -> u32 {
-        self.file.metadata().windows.len() as u32
-    }
-
-    /// The directory's leaves of a window, of all channels.
-    fn leaves(&self, window: u32) -> impl Iterator<Item = &LeafEntry> {
-        (0..self.file.channels()).flat_map(move |channel| self.file.leaves_of(window, channel))
-    }
-
-    /// An upper bound of the codes and outliers that a block stores.
-    fn most_stored(&self) -> usize {
-        let stored = |leaf: &LeafEntry| leaf.coded.saturating_add(leaf.outliers) as usize;
-        let most = (0..self.windows()).flat_map(|window| self.leaves(window)).map(stored).max().unwrap_or(0);
-        most.min(2 * self.file.largest_block())
-    }
-}
-
-/// Bytes of a stored code or outlier: packed, and unpacked in vectors that grow.
-const STORED_BYTES: usize = 20;
 
 impl From<CoefficientFile> for CoefficientScene {
     /// Splats the file's coefficients.
@@ -127,27 +108,11 @@ impl Scene for CoefficientScene {
         if !config.mode.is_projection() {
             return 2 * frames + 1; // values, not coefficients
         }
-        let planes = |window: u32| {
-            let record = &self.file.metadata().windows[window as usize];
-            let (missing, exact) = (self.file.has_missing(window), self.leaves(window).any(|leaf| leaf.exact > 0));
-            let is_coded = self.what == SplatSource::Coefficients;
-            let values = if !is_coded || exact || missing || record.outliers > 0 { frames } else { 0 };
-            let coefficients = if is_coded { record.coefficients as usize } else { 0 };
-            let absent = if missing { frames + 1 } else { 0 };
-            coefficients.max(frames) + values + absent + error_planes(config, record.parts())
-        };
-        (0..self.windows()).map(planes).max().unwrap_or(0)
+        self.needs.most_planes(frames, config)
     }
 
     fn block_bytes(&self) -> usize {
-        let windows = &self.file.metadata().windows;
-        let is_double = windows.iter().filter_map(|w| w.pyramid.as_ref()).any(|pyramid| !pyramid.single);
-        let any = |of: &dyn Fn(u32) -> bool| usize::from((0..self.windows()).any(of));
-        // Codes or nodes, and the values of all frames; what is stored exactly; a mask and corrections.
-        let refined = if is_double { size_of::<f64>() } else { size_of::<f32>() } + size_of::<f64>();
-        let exact = any(&|window| self.leaves(window).any(|leaf| leaf.exact > 0)) * 2 * self.file.sample().size();
-        let missing = any(&|window| self.file.has_missing(window)) * (1 + 32 + 24);
-        self.file.largest_block() * (refined + exact + missing) + self.most_stored() * STORED_BYTES
+        self.needs.block_bytes
     }
 
     fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {

@@ -6,6 +6,7 @@
 mod select;
 mod batch_plan;
 mod coded;
+mod needs;
 mod overview;
 mod coefficients;
 mod frames;

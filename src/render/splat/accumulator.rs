@@ -179,10 +179,11 @@ pub(in crate::render) fn splat(
             BandSums::Filtered(..) => {}
         }
     }
-    let mut stats = splat_in_batches(&mut FootprintBands::new(tiles, planes), blocks, source)?;
-    stats += splat_in_batches(&mut LatticeBands::new(cells, room), blocks, source)?;
-    if !room.is_exceeded() {
-        accumulators.iter_mut().for_each(BandAccumulator::filter);
+    let mut stats = splat_in_batches(&mut LatticeBands::new(cells, room), blocks, source)?;
+    if room.is_exceeded() {
+        return Ok(stats);
     }
+    stats += splat_in_batches(&mut FootprintBands::new(tiles, planes), blocks, source)?;
+    accumulators.iter_mut().for_each(BandAccumulator::filter);
     Ok(stats)
 }

@@ -3,7 +3,7 @@
 
 use super::cells::{Cells, LINE, Rectangle};
 use super::error::{SliceError, Weighting};
-use super::filtered::{FilteredCells, places, side_by_side};
+use super::filtered::{FilteredCells, Window, places, side_by_side};
 use super::kernel::Kernel;
 use super::prefilter::{self, HALF, Taps};
 use super::product::Product;
@@ -215,14 +215,11 @@ impl Lattice {
     /// Whether a block adds to any cell that the tiles of these rows read. Tiles take the mean of all cells that they read, also
     /// of those that no pixel uses ([`super::bundle`]), so bands must not leave such a block out.
     pub(in crate::render) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
-        let (first, cells) = self.filtered_rectangle(region);
-        let range = |first: [isize; 2], cells: [usize; 2], i: usize| first[i]..first[i] + cells[i] as isize;
+        let window = |(first, size): ([isize; 2], [usize; 2])| Window { first, size };
+        let block = window(self.filtered_rectangle(region));
         TileRect::cover(width, rows.clone(), self.tile()).iter().any(|tile| {
-            let (tile_first, tile_cells) = self.cells_reached(&tile.x, &tile.y);
-            (0..2).all(|i| {
-                let (a, b) = (range(first, cells, i), range(tile_first, tile_cells, i));
-                a.start < b.end && b.start < a.end
-            })
+            let tile = window(self.cells_reached(&tile.x, &tile.y));
+            block.part_in(&tile).iter().all(|(cells, _)| !cells.is_empty())
         })
     }
 
