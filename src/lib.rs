@@ -83,6 +83,7 @@
 //! | `convert` | frames to a coefficient file: reader, workers and writer |
 //! | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
 //! | `extract` | a coefficient file back to samples and to files of other programs |
+//! | `picture` | requests for pictures: resolved, planned, rendered and written, for all front ends |
 //! | `cli` | what the programs in `bin/` share |
 //!
 //! The bytes of a coefficient file are a package of their own, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
@@ -120,7 +121,7 @@
 //! A test reads the sources and checks these rules.
 //!
 //! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `codec`; then
-//!   `file`; then `convert`, `render` and `extract`; then `cli`; then the programs.
+//!   `file`; then `convert`, `render` and `extract`; then `picture`; then `cli`; then the programs.
 //! - `convert`, `render` and `extract` do not use each other. They meet in the coefficient file.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
 //! - All `unsafe` code is in `base/mapped.rs`.
@@ -154,6 +155,7 @@ pub mod view;
 pub mod convert;
 pub mod render;
 pub mod extract;
+pub mod picture;
 #[doc(hidden)]
 #[cfg(feature = "args")]
 pub mod cli;

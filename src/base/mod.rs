@@ -5,6 +5,9 @@
 mod remedy;
 pub mod error;
 pub mod progress;
+pub mod cancel;
+pub mod choice;
+pub mod report;
 pub(crate) mod memory;
 pub(crate) mod zeroed;
 #[doc(hidden)]
@@ -20,9 +23,11 @@ pub mod time_labels;
 pub mod sample;
 pub(crate) mod stored;
 pub mod grid;
+pub mod values;
 pub mod description;
 pub mod mapped;
 #[doc(hidden)]
 pub mod output;
+pub mod inputs;
 #[doc(hidden)]
 pub mod npy;

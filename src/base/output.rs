@@ -13,6 +13,7 @@ use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -31,6 +32,8 @@ enum Target {
     Stdout(BufWriter<Stdout>),
     /// A device or a pipe, written directly.
     Special(BufWriter<File>),
+    /// The bytes that are committed go to the receiver.
+    Memory(Vec<u8>, Sender<Vec<u8>>),
     File(Part, BufWriter<File>), // in this order: the file is removed before it is unlocked
 }
 
@@ -90,6 +93,12 @@ impl Output {
     /// Opens `path`, or standard output for `-`. An existing file is an error unless `force` replaces it.
     pub fn create(path: &Path, force: bool) -> Result<Self> {
         Self::create_after(path, force, |file| file.set_len(0))
+    }
+
+    /// Writes to memory. The bytes come from the receiver when the output is committed. `name` stands for it in messages.
+    pub(crate) fn to_memory(name: &str) -> (Self, Receiver<Vec<u8>>) {
+        let (committed, bytes) = channel();
+        (Self { path: name.into(), target: Target::Memory(Vec::new(), committed) }, bytes)
     }
 
     fn create_after(path: &Path, force: bool, begin: impl FnOnce(&File) -> io::Result<()>) -> Result<Self> {
@@ -178,6 +187,9 @@ impl Output {
     /// the commit.
     pub fn commit_if(mut self, right: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         self.writer().flush().map_err(|e| Error::io(&self.path, "writing", e))?;
+        if let Target::Memory(bytes, committed) = &mut self.target {
+            let _ = committed.send(std::mem::take(bytes)); // a receiver that is gone needs no bytes
+        }
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
         file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
         right(&part.path)?;
@@ -280,6 +292,7 @@ impl Output {
     fn writer(&mut self) -> &mut dyn Write {
         match &mut self.target {
             Target::Stdout(out) => out,
+            Target::Memory(bytes, _) => bytes,
             Target::Special(out) | Target::File(_, out) => out,
         }
     }

@@ -1,11 +1,15 @@
 //! Options of every program: worker threads, notes, progress and reports.
 
-use super::print;
 use super::terminal::{ProgressKind, TerminalProgress};
 use super::values::Size;
-use crate::base::error::{Error, Result};
+use super::{note_text, print};
+use crate::base::error::{Error, Note, Result};
+use crate::base::progress::Progress;
+use crate::base::report::report_text;
+use crate::picture::Reporter;
 use clap::Args;
 use serde::Serialize;
+use std::fmt::Arguments;
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -73,21 +77,39 @@ impl CommonArgs {
 
     /// A detail: the bytes read of a coefficient file of `bytes` bytes. Bytes that are read again count again.
     pub fn detail_read(&self, read: u64, bytes: u64) {
-        let again = if read > bytes { ", as some were read more than once" } else { "" };
-        self.detail(format_args!("{read} bytes were read of a file of {bytes}{again}"));
+        Reporter::detail_read(self, read, bytes);
     }
 
     /// With `--json`, prints a report to standard output, or to standard error if `data_on_stdout`.
     pub fn report(&self, report: &impl Serialize, data_on_stdout: bool) -> Result<()> {
-        if !self.json {
-            return Ok(());
-        }
-        let text = report_text(report)?;
+        if self.json { Self::print_report(&report_text(report)?, data_on_stdout) } else { Ok(()) }
+    }
+
+    /// Prints the text of a report to standard output, or to standard error if `data_on_stdout`.
+    pub(super) fn print_report(text: &str, data_on_stdout: bool) -> Result<()> {
         if data_on_stdout {
             note(text.trim_end());
             return Ok(());
         }
-        print(&text)
+        print(text)
+    }
+}
+
+impl Reporter for CommonArgs {
+    fn note(&self, text: Arguments<'_>) {
+        Self::note(self, text);
+    }
+
+    fn detail(&self, text: Arguments<'_>) {
+        Self::detail(self, text);
+    }
+
+    fn note_source(&self, note: &Note) {
+        Self::note(self, note_text(note));
+    }
+
+    fn progress(&self, stage: &'static str, unit: &'static str) -> Box<dyn Progress + '_> {
+        Box::new(Self::progress(self, stage, unit))
     }
 }
 
@@ -97,20 +119,6 @@ impl CommonArgs {
 /// The text is not a whole number above 0.
 fn threads(text: &str) -> std::result::Result<NonZeroUsize, String> {
     text.parse().map_err(|_| "takes a whole number, at least 1; without it, each core has one thread".into())
-}
-
-/// The text that `--json` prints.
-pub fn report_text(report: &impl Serialize) -> Result<String> {
-    let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
-    text.map(|text| text + "\n").map_err(|e| Error::usage(format!("--json: {e}")))
-}
-
-/// The object that `--json` prints. If the meaning of a key changes, so does `schema`.
-#[derive(Debug, Serialize)]
-struct Versioned<'a, T> {
-    schema: u32,
-    #[serde(flatten)]
-    report: &'a T,
 }
 
 pub(super) fn note(text: impl std::fmt::Display) {

@@ -1,18 +1,19 @@
 //! Options for reading an archive.
 
 #[cfg(feature = "cli")]
-use super::{CommonArgs, RemoteArgs, note_text, remote::is_coefficient_name};
+use super::{CommonArgs, RemoteArgs, note_text};
 use super::{Dims, FrameRange, RegionSpec, TimesSpec, Triple, times};
 use crate::base::error::{Error, Result};
 use crate::base::mapped::Access;
-use crate::base::output::part_of;
 use crate::base::sample::SampleType;
 use crate::file::CoefficientFile;
 use crate::file::setting;
+#[cfg(feature = "cli")]
+use crate::picture::is_coefficient_name;
 use crate::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
 use clap::{Args, ValueEnum};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 /// The order of a sample's bytes.
@@ -120,9 +121,17 @@ impl InputArgs {
         Access::unless(self.no_mmap)
     }
 
+    /// How frames are read. Decoded or piped frames may take `memory` bytes.
+    ///
+    /// # Errors
+    /// A list of times that cannot be read.
+    pub fn open_options(&self, memory: usize) -> Result<OpenOptions> {
+        Ok(OpenOptions { times: self.given_times()?, ..self.options(memory) })
+    }
+
     /// Opens an archive and prints no notes. Decoded or piped frames may take `memory` bytes.
     pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
-        source::open(inputs, &OpenOptions { times: self.given_times()?, ..self.options(memory) })
+        source::open(inputs, &self.open_options(memory)?)
     }
 
     /// The variables among which `--variable` must choose; none if the archive can be opened without it.
@@ -161,6 +170,22 @@ impl InputArgs {
         let source = self.open_quietly(inputs, common.stream_memory())?;
         source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
         Ok(source)
+    }
+
+    /// The given options, as words of a command.
+    pub(super) fn words(&self) -> Vec<String> {
+        let times = match &self.times {
+            Some(TimesSpec::File(path)) => Some(path.display().to_string()),
+            Some(TimesSpec::Regular(times)) => Some(times.to_string()),
+            None => None,
+        };
+        let own = [("times", times), ("dt", self.dt.map(|step| step.to_string()))];
+        let own = own.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        let stored = self.settings().filter(|(name, _)| *name != times::TIMES);
+        let mut words: Vec<String> = stored.chain(own).map(|(name, value)| format!("--{name}={value}")).collect();
+        words.extend(self.allow_gaps.then(|| "--allow-gaps".into()));
+        words.extend(self.no_mmap.then(|| "--no-mmap".into()));
+        words
     }
 
     /// The given options, to be stored in a file. [`Self::open_again`] needs them to read the same samples.
@@ -292,29 +317,4 @@ pub fn narrow(
     let (first, step, count) = frames.unwrap_or_else(all).resolve(archive.frames)?;
     let region = region.map_or(Ok(archive.grid.whole()), |r| r.resolve(&archive.grid))?;
     source::select(source, Selection { first, step, frames: count, region })
-}
-
-/// An error if writing `output`, which may be a numbered name, would replace an input or a frame beside it. `--force`
-/// does not allow that.
-pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
-    let real = |path: &Path| path.canonicalize().ok();
-    let folder = |path: &Path| real(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
-    let numbered = output.to_string_lossy().contains('%');
-    let may_be_frame = !matches!(output.extension().and_then(|e| e.to_str()), Some("wspl" | "png" | "y4m"));
-    let beside = |input: &Path| {
-        let inputs = if input.is_dir() { real(input) } else { folder(input) };
-        let several = input.is_dir() || !input.exists();
-        may_be_frame && several && inputs.is_some() && inputs == folder(output)
-    };
-    let replaces = |input: &PathBuf| {
-        let is = |name: &Path| name.is_file() && real(input) == real(name);
-        is(output) || is(&part_of(output)) || (numbered || output.is_file()) && beside(input)
-    };
-    match inputs.iter().find(|input| replaces(input)) {
-        Some(input) => {
-            let (output, input) = (output.display(), input.display());
-            Err(Error::usage(format!("{output}: would replace the input {input}; name another output")))
-        }
-        None => Ok(()),
-    }
 }

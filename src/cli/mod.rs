@@ -8,6 +8,8 @@
 #[cfg(feature = "cli")]
 mod advice;
 #[cfg(feature = "cli")]
+mod choice;
+#[cfg(feature = "cli")]
 mod colours;
 #[cfg(feature = "cli")]
 mod common;
@@ -34,13 +36,16 @@ mod values;
 #[cfg(feature = "view")]
 pub mod view;
 
+pub use crate::base::inputs::spare_inputs;
+pub use crate::base::values::{FrameList, FrameRange, Numbers, Pair, RegionSpec, Triple, Whole};
+pub use crate::colour::OpacityPoints;
 #[cfg(feature = "cli")]
-pub use colours::{open_colours, stretched, transfer_function};
+pub use colours::transfer_function;
 #[cfg(feature = "cli")]
-pub use common::{CommonArgs, report_text};
+pub use common::CommonArgs;
 #[cfg(feature = "cli")]
 pub use generate::{GenerateArgs, Generated};
-pub use input::{InputArgs, SelectArgs, narrow, remembered, spare_inputs};
+pub use input::{InputArgs, SelectArgs, narrow, remembered};
 pub use messages::{advice, of_error as error_text, of_note as note_text};
 #[cfg(feature = "cli")]
 pub use program::{command, main};
@@ -49,10 +54,7 @@ pub use remote::RemoteArgs;
 #[cfg(feature = "cli")]
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
-pub use values::{
-    Dims, FrameList, FrameRange, MaxError, Numbers, Opacities, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole,
-    share,
-};
+pub use values::{Dims, MaxError, Size, share};
 
 use crate::base::error::{Error, Result};
 use std::io::{self, Write};

@@ -10,6 +10,7 @@ mod lab;
 mod list;
 mod lookup;
 mod named;
+mod opacities;
 mod paraview;
 mod scale;
 mod space;
@@ -18,6 +19,7 @@ mod table;
 pub use distribution::{Common, Distribution};
 pub use named::NAMES;
 use named::Named;
+pub use opacities::{Opacities, OpacityPoints};
 pub use scale::{Clear, Norm, Scale};
 pub use space::ColourSpace;
 

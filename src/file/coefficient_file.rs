@@ -14,20 +14,20 @@ use crate::file::counted::Counted;
 use crate::file::detail;
 use crate::file::fetch::BLOCKS_TOGETHER;
 use crate::file::promise;
-use crate::remote::{self, RemoteFile, RemoteOptions};
+use crate::remote::{self, RemoteOptions};
 use crate::source::{CHANNELS, ColourTransform};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage};
 
-/// An open coefficient file; several threads may read it.
-#[derive(Debug)]
+/// An open coefficient file; several threads may read it. Clones share what is open.
+#[derive(Debug, Clone)]
 pub struct CoefficientFile {
     path: PathBuf,
-    pub(super) reader: Reader<Counted>,
+    pub(super) reader: Arc<Reader<Counted>>,
     /// The state of a local file when it was opened.
     state: Option<State>,
     /// The lattice.
@@ -41,7 +41,7 @@ pub struct CoefficientFile {
     /// What made samples into channels, if there are several.
     colour_transform: Option<ColourTransform>,
     /// Damaged blocks that are taken for missing samples, if they are.
-    skipped: Option<Damage>,
+    skipped: Option<Arc<Damage>>,
 }
 
 /// What is wrong with a file, block by block.
@@ -95,12 +95,7 @@ impl CoefficientFile {
     /// # Errors
     /// As [`Self::open`], and all that can be wrong on the way.
     pub fn open_remote(address: &Path, options: &RemoteOptions) -> Result<Self> {
-        Self::from_remote(address, remote::open(address, options)?)
-    }
-
-    /// Opens a remote file that is kept open.
-    pub(crate) fn from_remote(address: &Path, file: RemoteFile) -> Result<Self> {
-        Self::from_kept(public_name(address), Box::new(file))
+        Self::from_kept(public_name(address), Box::new(remote::open(address, options)?))
     }
 
     /// Opens a file in any storage: memory, or bytes far away. `name` stands for it in messages. What is read of a
@@ -122,7 +117,17 @@ impl CoefficientFile {
         let m = reader.metadata();
         let (grid, blocks) = detail::whole(m);
         let colour_transform = colour_transform(m).map_err(failed)?;
-        Ok(Self { path, grid, blocks, lod: 0, exaggeration: 1.0, colour_transform, reader, state: None, skipped: None })
+        Ok(Self {
+            path,
+            grid,
+            blocks,
+            lod: 0,
+            exaggeration: 1.0,
+            colour_transform,
+            reader: reader.into(),
+            state: None,
+            skipped: None,
+        })
     }
 
     /// The file as a coarser lattice: every 2^lod-th voxel along each axis, with all frames and the same first voxel.
@@ -289,7 +294,8 @@ impl CoefficientFile {
             true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // threads would push out each other's pages
             false => leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?,
         };
-        self.skipped = Some(Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() });
+        let damage = Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() };
+        self.skipped = Some(damage.into());
         Ok(self)
     }
 
@@ -316,7 +322,7 @@ impl CoefficientFile {
 
     /// What [`Self::skip_damaged`] found.
     fn skipped(&self) -> Option<&Damage> {
-        self.skipped.as_ref().filter(|damage| !damage.blocks.is_empty())
+        self.skipped.as_deref().filter(|damage| !damage.blocks.is_empty())
     }
 
     /// An error that names the damaged blocks that were skipped, if any were. Call it last.

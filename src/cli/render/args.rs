@@ -1,17 +1,17 @@
 //! The arguments of `wavesplat-render`.
 
-use super::along::AlongArgs;
-use super::annotations::AnnotationArgs;
-use super::colours::ColourArgs;
-use super::cuts::CutArgs;
-use super::motion::MotionArgs;
-use super::parts::PartArgs;
-use super::probes::ProbeArgs;
-use super::view_names::ViewSpec;
-use crate::cli::{CommonArgs, FrameList, InputArgs, RegionSpec, RemoteArgs, Triple, Whole, share};
-use crate::render::Limit;
+use super::groups::{AnnotationArgs, ColourArgs, MotionArgs, PartialArgs, SampleArgs, SeriesArgs, SliceArgs};
+use crate::base::address::is_address;
+use crate::base::choice::Choice;
+use crate::base::error::Result;
+use crate::base::values::{FrameList, RegionSpec, Triple, Whole};
+use crate::cli::choice::choice;
+use crate::cli::{CommonArgs, InputArgs, RemoteArgs, share};
+use crate::picture::values::{Detail, Exaggeration, ViewAngles};
+use crate::picture::{Inputs, PictureRequest, Session};
 use crate::render::sink::{Depth, PictureFormat};
-use clap::{Parser, ValueEnum};
+use crate::render::{Limit, Quantity, SplatSource};
+use clap::Parser;
 use std::path::PathBuf;
 
 /// Render pictures of time-varying volumes.
@@ -46,200 +46,179 @@ along x. A tau of about 1 / the volume's depth makes the near side stand out."
 pub struct Cli {
     /// Coefficient file; --method direct also takes frames, --sum takes parts
     #[arg(required = true)]
-    pub(crate) inputs: Vec<PathBuf>,
+    pub(super) inputs: Vec<PathBuf>,
     /// File to write, a pattern like frame_%04d.png, or - for standard output. %v or %03v becomes the number of the
     /// view; a file name without a pattern takes all views of one frame, one after another
     #[arg(short, long, value_name = "OUT", help_heading = "Output")]
-    pub(crate) output: PathBuf,
+    pub(super) output: PathBuf,
     /// Replace any existing files. Without it, only pictures and reports that wavesplat-render made are replaced: .png,
     /// .apng, .exr and .json say so
     #[arg(long, help_heading = "Output")]
-    pub(crate) force: bool,
+    pub(super) force: bool,
     /// Azimuth and elevation in degrees, or a name: top, bottom, front, back, left, right, iso, north, south, east or
     /// west; repeat for more views. The views of one run share its reading, and need %v in the file name [default:
     /// 30,30; one --slice is seen face-on]
-    #[arg(long = "view", value_name = "AZ,EL", allow_hyphen_values = true, help_heading = "View")]
-    pub(crate) views: Vec<ViewSpec>,
+    #[arg(long, value_name = "AZ,EL", allow_hyphen_values = true, help_heading = "View")]
+    pub(super) view: Vec<ViewAngles>,
     /// Render N views for each view, evenly spaced around the vertical axis, starting with it; all use the smallest of
     /// their scales
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]
-    pub(crate) orbit: u32,
+    pub(super) orbit: u32,
     /// Turn the picture counter-clockwise by this many degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "View")]
-    pub(crate) roll: f64,
+    pub(super) roll: f64,
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "512x512", help_heading = "View")]
-    pub(crate) size: Whole<2>,
+    pub(super) size: Whole<2>,
     /// Pixels per world unit [default: fit the whole volume]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "View")]
-    pub(crate) scale: Option<f64>,
+    pub(super) scale: Option<f64>,
     /// World point in the middle of the picture [default: the volume's centre]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
-    pub(crate) center: Option<Triple>,
+    pub(super) center: Option<Triple>,
     /// Draw heights this many times as tall: a number, or auto: more than 1 only if the volume is nearly flat, with a
     /// note that names the factor
-    #[arg(long, value_name = "Z", default_value = "auto", value_parser = parse_exaggeration, help_heading = "View")]
-    pub(crate) exaggerate: Exaggeration,
+    #[arg(long, value_name = "Z", default_value = "auto", help_heading = "View")]
+    pub(super) exaggerate: Exaggeration,
     /// Render only these frames: ranges a:b:step or numbers, separated by commas
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "View")]
-    pub(crate) frames: Option<FrameList>,
+    pub(super) frames: Option<FrameList>,
     /// Render only these voxels: x0:x1,y0:y1,z0:z1
     #[arg(long, value_name = "BOX", help_heading = "View")]
-    pub(crate) region: Option<RegionSpec>,
+    pub(super) region: Option<RegionSpec>,
     /// Attenuation per world unit of depth. Pixels whose weights sum to less than 1 % of the view's largest are
     /// background
     #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
-    pub(crate) tau: f64,
+    pub(super) tau: f64,
     /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
-    pub(crate) sigma: Option<f64>,
+    pub(super) sigma: Option<f64>,
     /// Error that splatting may add; more is faster. For means it is a share of the value range, at pixels with the
     /// view's largest weights (elsewhere in inverse proportion to the weights); for emissions, a share of the brightest
     /// pixel that the largest sample could give. 0 uses the exact method [default: --tolerance or the file's tolerance,
     /// at most 1e-3]
     #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
-    pub(crate) splat_error: Option<f64>,
+    pub(super) splat_error: Option<f64>,
     /// Level of detail: read and splat only every 2^N-th voxel along each axis, with a wider kernel. auto takes the
     /// coarsest level whose voxels are no larger than a pixel. The picture shows the coarser lattice; error bounds do
     /// not cover the voxels left out
-    #[arg(long, value_name = "N", default_value = "0", value_parser = parse_detail, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Kernel")]
-    pub(crate) lod: Detail,
+    #[arg(long, value_name = "N", default_value = "0", help_heading = "Kernel")]
+    pub(super) lod: Detail,
     /// Quick look: twice as fast, but the splat error is only estimated, not bounded
-    #[arg(long, conflicts_with_all = ["splat_error", "error_image"], help_heading = "Kernel")]
-    pub(crate) fast: bool,
+    #[arg(long, help_heading = "Kernel")]
+    pub(super) fast: bool,
     /// Read and splat less: pictures may be off by this share of the value range (for emissions: samples may). With
     /// --error certified, at least the file's largest sample error
     #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = "Error")]
-    pub(crate) tolerance: Option<f64>,
+    pub(super) tolerance: Option<f64>,
     /// Error that --tolerance limits; both are reported
-    #[arg(long, value_enum, default_value = "certified", help_heading = "Error")]
-    pub(crate) error: ErrorName,
+    #[arg(long, value_parser = choice::<Limit>(), default_value = "certified", help_heading = "Error")]
+    pub(super) error: Limit,
     /// Also write pictures of the certified error: an upper bound, per pixel, on the difference from a picture of the
     /// original samples drawn with the uncut kernel (a file or pattern like -o; .npy in units of --quantity, colours
     /// from 0 to the largest error of small pictures)
     #[arg(long, value_name = "OUT", help_heading = "Error")]
-    pub(crate) error_image: Option<PathBuf>,
+    pub(super) error_image: Option<PathBuf>,
     /// Quantity that a pixel shows
-    #[arg(long, value_enum, default_value = "mean", help_heading = "Along the ray")]
-    pub(crate) quantity: QuantityName,
+    #[arg(long, value_parser = choice::<Quantity>(), default_value = "mean", help_heading = "Along the ray")]
+    pub(super) quantity: Quantity,
     #[command(flatten)]
-    pub(crate) motion: MotionArgs,
+    pub(super) motion: MotionArgs,
     #[command(flatten)]
-    pub(crate) colour: ColourArgs,
+    pub(super) colour: ColourArgs,
     #[command(flatten)]
-    pub(crate) around: AnnotationArgs,
+    pub(super) around: AnnotationArgs,
     #[command(flatten)]
-    pub(crate) along: AlongArgs,
+    pub(super) samples: SampleArgs,
     #[command(flatten)]
-    pub(crate) cuts: CutArgs,
+    pub(super) slices: SliceArgs,
     #[command(flatten)]
-    pub(crate) probes: ProbeArgs,
+    pub(super) series: SeriesArgs,
     #[command(flatten)]
-    pub(crate) parts: PartArgs,
+    pub(super) partial: PartialArgs,
     /// Render from coefficients, or frame by frame (the conventional method)
-    #[arg(long, value_enum, default_value = "coefficients", help_heading = "Input")]
-    pub(crate) method: MethodName,
+    #[arg(long, value_parser = choice::<SplatSource>(), default_value = "coefficients", help_heading = "Input")]
+    pub(super) method: SplatSource,
     /// Picture format: png, npy, y4m, rgb24, gray16, apng (an animated PNG), sheet (all pictures in one PNG), mp4,
     /// webm and gif (by ffmpeg, which must be installed), html (a web page with all pictures, colours and a time slider, to
     /// open from disk or to send), or exr if it was built in [default: by the extension of OUT; png for -]
-    #[arg(long, value_parser = parse_format, help_heading = "Output")]
-    pub(crate) format: Option<PictureFormat>,
+    #[arg(long, value_parser = PictureFormat::named, help_heading = "Output")]
+    pub(super) format: Option<PictureFormat>,
     /// Bits per channel of a PNG: 8, or 16 (with --colormap grey, a single channel)
-    #[arg(long, value_name = "BITS", default_value = "8", value_parser = parse_depth, help_heading = "Output")]
-    pub(crate) depth: Depth,
+    #[arg(long, value_name = "BITS", default_value = "8", value_parser = Depth::named, help_heading = "Output")]
+    pub(super) depth: Depth,
     /// Also write the --json report to a file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(crate) sidecar: Option<PathBuf>,
+    pub(super) sidecar: Option<PathBuf>,
     /// A value that means "missing" in frames, besides NaN and infinities
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = "Input")]
-    pub(crate) missing_value: Option<f64>,
+    pub(super) missing_value: Option<f64>,
     /// Show damaged and lost blocks of a coefficient file as missing samples, and render the rest; exit code 3. No
     /// error is certified then
-    #[arg(long, conflicts_with_all = ["error_image", "tolerance"], help_heading = "Input")]
-    pub(crate) skip_damaged: bool,
+    #[arg(long, help_heading = "Input")]
+    pub(super) skip_damaged: bool,
     #[command(flatten)]
-    pub(crate) input: InputArgs,
+    pub(super) input: InputArgs,
     #[command(flatten)]
-    pub(crate) remote: RemoteArgs,
+    pub(super) remote: RemoteArgs,
     #[command(flatten)]
-    pub(crate) common: CommonArgs,
+    pub(super) common: CommonArgs,
 }
 
-/// How much taller than true heights are drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Exaggeration {
-    /// As the volume needs.
-    Auto,
-    /// By this factor.
-    Factor(f64),
-}
-
-fn parse_exaggeration(text: &str) -> std::result::Result<Exaggeration, String> {
-    let factor = || text.parse().ok().filter(|factor: &f64| factor.is_finite() && *factor > 0.0);
-    match text {
-        "auto" => Ok(Exaggeration::Auto),
-        _ => factor().map(Exaggeration::Factor).ok_or_else(|| "auto, or a number above 0".into()),
+impl Cli {
+    /// What is asked for.
+    pub(super) fn request(&self) -> PictureRequest {
+        let request = PictureRequest {
+            output: self.output.clone(),
+            force: self.force,
+            view: self.view.clone(),
+            orbit: self.orbit,
+            roll: self.roll,
+            size: self.size,
+            scale: self.scale,
+            center: self.center,
+            exaggerate: self.exaggerate,
+            frames: self.frames.clone(),
+            region: self.region,
+            tau: self.tau,
+            sigma: self.sigma,
+            splat_error: self.splat_error,
+            lod: self.lod,
+            fast: self.fast,
+            tolerance: self.tolerance,
+            error: self.error,
+            error_image: self.error_image.clone(),
+            quantity: self.quantity,
+            method: self.method,
+            format: self.format,
+            depth: self.depth,
+            sidecar: self.sidecar.clone(),
+            missing_value: self.missing_value,
+            skip_damaged: self.skip_damaged,
+            ..PictureRequest::default()
+        };
+        let request = self.motion.applied_to(self.colour.applied_to(self.around.applied_to(request)));
+        self.samples.applied_to(self.slices.applied_to(self.series.applied_to(self.partial.applied_to(request))))
     }
-}
 
-/// The level of detail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Detail {
-    /// The coarsest with voxels no larger than a pixel.
-    Auto,
-    /// Every 2^N-th voxel.
-    Level(u32),
-}
-
-fn parse_detail(text: &str) -> std::result::Result<Detail, String> {
-    let level = || text.parse().ok().filter(|level| *level < 32).map(Detail::Level);
-    if text == "auto" { Ok(Detail::Auto) } else { level().ok_or_else(|| "auto, or 0, 1, 2, ...".into()) }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum QuantityName {
-    /// The weighted mean along the ray, in the samples' unit
-    Mean,
-    /// The sum along the ray: value times length
-    Emission,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ErrorName {
-    /// The largest error of any sample, guaranteed
-    Certified,
-    /// The root mean square error over the pixels, estimated
-    Expected,
-}
-
-impl From<ErrorName> for Limit {
-    fn from(name: ErrorName) -> Self {
-        match name {
-            ErrorName::Certified => Self::Certified,
-            ErrorName::Expected => Self::Expected,
+    /// What pictures are made of.
+    ///
+    /// # Errors
+    /// Options that do not apply to a coefficient file, or a list of times that cannot be read.
+    pub(super) fn session(&self) -> Result<Session> {
+        let remote =
+            if self.inputs.iter().any(|path| is_address(path)) { self.remote.options()? } else { Default::default() };
+        let frames = self.input.open_options(self.common.stream_memory())?;
+        let session = Session::new(Inputs { paths: self.inputs.clone(), frames, remote }, self.common.memory.0);
+        if !self.partial.sum && session.coefficient_path(self.method).is_some() {
+            self.input.refuse_for_coefficients()?;
         }
+        Ok(session)
     }
-}
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum MethodName {
-    /// Splat coefficients once for all frames of a window
-    Coefficients,
-    /// Splat every frame
-    Direct,
-}
-
-fn parse_depth(text: &str) -> std::result::Result<Depth, String> {
-    match text {
-        "8" => Ok(Depth::Eight),
-        "16" => Ok(Depth::Sixteen),
-        _ => Err("8 or 16".into()),
+    /// Words for how the inputs are opened.
+    pub(super) fn input_words(&self) -> Vec<String> {
+        let remote = self.remote.words().into_iter().map(|word| word.to_string_lossy().into_owned());
+        self.input.words().into_iter().chain(remote).collect()
     }
-}
-
-pub(crate) fn parse_format(text: &str) -> std::result::Result<PictureFormat, String> {
-    let found = PictureFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found
-        .map(|(_, format)| format)
-        .ok_or_else(|| "one of png npy y4m rgb24 gray16 apng sheet mp4 webm gif html exr".into())
 }

@@ -3,7 +3,8 @@
 use super::args::Cli;
 use crate::base::error::Result;
 use crate::cli::{self, Generated};
-use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Parser};
+use crate::picture::exclude;
+use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Id, Parser};
 
 /// The two things that the program can do.
 pub enum Program {
@@ -15,14 +16,51 @@ impl Program {
     /// Does what the options ask for.
     pub fn run(self) -> Result<()> {
         match self {
-            Self::Render(mut cli) => {
-                cli.imply_mode()?;
-                cli.imply_look()?;
-                cli.run()
-            }
+            Self::Render(cli) => cli.run(),
             Self::Generate(what) => what.run(cli::command::<Self>()),
         }
     }
+}
+
+/// The options that most people need: those of the short help.
+const NEEDED: [&str; 21] = [
+    "output",
+    "force",
+    "format",
+    "view",
+    "orbit",
+    "size",
+    "frames",
+    "region",
+    "slice",
+    "lod",
+    "tolerance",
+    "mode",
+    "iso",
+    "transfer_function",
+    "colormap",
+    "range",
+    "annotate",
+    "probe",
+    "method",
+    "threads",
+    "memory",
+];
+
+/// Hides an option from the short help unless most people need it.
+fn shortened(arg: Arg) -> Arg {
+    let is_needed = arg.is_positional() || NEEDED.contains(&arg.get_id().as_str());
+    arg.hide_short_help(!is_needed)
+}
+
+/// The command with conflicts between the options of fields that cannot be given together.
+fn with_exclusions(command: Command) -> Command {
+    let all: Vec<Id> = command.get_arguments().map(|arg| arg.get_id().clone()).collect();
+    command.mut_args(|arg| {
+        let others = all.iter().filter(|other| exclude(arg.get_id().as_str(), other.as_str()));
+        let others: Vec<Id> = others.cloned().collect();
+        arg.conflicts_with_all(others)
+    })
 }
 
 const GENERATE: &str = "generate";
@@ -32,7 +70,7 @@ impl CommandFactory for Program {
         let generate = Arg::new(GENERATE).long(GENERATE).value_name("WHAT").exclusive(true);
         let generate = generate.value_parser(|text: &str| text.parse::<Generated>());
         let help = "Only print the man page (man) or the completions for a shell (completions-bash, -zsh, -fish ...)";
-        Cli::command().arg(generate.help(help))
+        with_exclusions(Cli::command()).arg(generate.help(help)).mut_args(shortened)
     }
 
     fn command_for_update() -> Command {

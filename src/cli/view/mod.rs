@@ -5,9 +5,8 @@ mod guard;
 mod server;
 
 use crate::base::error::{Error, Result};
-use crate::cli::remote::{KeptOpen, is_coefficient_name};
-use crate::cli::render::live::Scenery;
-use crate::cli::{self, CommonArgs, RemoteArgs};
+use crate::cli::{self, CommonArgs, RemoteArgs, render};
+use crate::picture::{ViewerSession, is_coefficient_name};
 use clap::Args;
 use server::{Server, Stop};
 use std::ffi::OsString;
@@ -52,7 +51,7 @@ pub struct ViewArgs {
 /// Shows the page until the program is interrupted.
 pub fn run(args: &ViewArgs) -> Result<()> {
     args.common.start()?;
-    let viewer = Viewer::new(args.scenery(), (args.listen, args.port), std::env::var(guard::TOKEN).ok())?;
+    let viewer = Viewer::new(args.session()?, args.listen, args.port, std::env::var(guard::TOKEN).ok())?;
     if !args.listen.is_loopback() {
         args.common.note("other machines that know this address can look at these data:");
     }
@@ -77,14 +76,14 @@ impl Viewer {
     ///
     /// # Errors
     /// Inputs that cannot be opened, an address that cannot be had, or a token that is too short.
-    pub fn new(scenery: Scenery, (listen, port): (IpAddr, u16), token: Option<String>) -> Result<Self> {
-        let facts = scenery.facts()?;
+    pub fn new(session: ViewerSession, listen: IpAddr, port: u16, token: Option<String>) -> Result<Self> {
+        let facts = session.facts()?;
         let listening = |e| failed(&format!("{listen}:{port}"), e);
         let listener = TcpListener::bind((listen, port)).map_err(listening)?;
         let at = listener.local_addr().map_err(listening)?;
         let token = guard::chosen_token(token)?;
         let address = format!("http://{at}/{token}/");
-        Ok(Self { server: Server::new(scenery, facts, token), listener, address })
+        Ok(Self { server: Server::new(session, facts, token), listener, address })
     }
 
     /// Answers requests until it is stopped.
@@ -123,16 +122,26 @@ fn failed(at: &str, error: io::Error) -> Error {
 }
 
 impl ViewArgs {
-    fn scenery(&self) -> Scenery {
+    fn session(&self) -> Result<ViewerSession> {
         let options = self.remote.words().into_iter().chain(self.options.iter().cloned());
-        scenery(&self.inputs, self.common.memory.0, options)
+        viewer_session(&self.inputs, self.common.memory.0, options)
     }
 }
 
-/// The scene of a coefficient file or of frames, with more options of `wavesplat-render`.
-pub fn scenery(inputs: &[PathBuf], memory: usize, options: impl IntoIterator<Item = OsString>) -> Scenery {
+/// A viewer of a coefficient file or of frames, with more options of `wavesplat-render`.
+///
+/// # Errors
+/// Words that are no options, or that have no place in a viewer.
+pub fn viewer_session(
+    inputs: &[PathBuf],
+    memory: usize,
+    options: impl IntoIterator<Item = OsString>,
+) -> Result<ViewerSession> {
     let method = if inputs.iter().all(|path| is_coefficient_name(path)) { "coefficients" } else { "direct" };
-    let given = [format!("--method={method}"), format!("--memory={memory}")].map(OsString::from);
-    let options = given.into_iter().chain(options).collect();
-    Scenery { inputs: inputs.iter().map(OsString::from).collect(), options, open: KeptOpen::default() }
+    let mut words = vec![format!("--method={method}").into(), format!("--memory={memory}").into()];
+    words.extend(options);
+    words.extend(["-o".into(), "live.html".into(), "--".into()]);
+    words.extend(inputs.iter().map(OsString::from));
+    let render::Parsed { session, request, input_words } = render::parsed(words)?;
+    Ok(ViewerSession::new(session, request, input_words))
 }

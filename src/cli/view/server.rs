@@ -1,9 +1,9 @@
 //! The server of the page: it renders what the page asks for, one request after another, as long as the page waits.
 
 use super::guard;
+use crate::base::cancel::CancelToken;
 use crate::base::error::Result;
-use crate::cli::render::live::{Saved, Scenery};
-use crate::cli::render::{Look, Work};
+use crate::picture::{Saved, ViewRequest, ViewerSession};
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Query, Request, State};
@@ -34,14 +34,14 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 /// What all requests share.
 pub(super) struct Server {
-    scenery: Arc<Scenery>,
+    session: Arc<ViewerSession>,
     /// The facts about the scene for the page, as JSON.
     facts: String,
     token: String,
     /// One request renders at a time, with all threads.
     renders: Arc<Semaphore>,
     /// The current work, or the last one.
-    work: Mutex<Arc<Work>>,
+    work: Mutex<Arc<CancelToken>>,
     requests: Semaphore,
 }
 
@@ -58,7 +58,7 @@ impl Stop {
 type Shared = State<Arc<Server>>;
 
 /// Cancels work when it is dropped, such as when the client disconnects.
-struct Wait(Arc<Work>);
+struct Wait(Arc<CancelToken>);
 
 impl Drop for Wait {
     fn drop(&mut self) {
@@ -76,9 +76,9 @@ impl IntoResponse for Failed {
 }
 
 impl Server {
-    pub(super) fn new(scenery: Scenery, facts: String, token: String) -> Self {
+    pub(super) fn new(session: ViewerSession, facts: String, token: String) -> Self {
         let (renders, requests) = (Arc::new(Semaphore::new(1)), Semaphore::new(MOST_REQUESTS));
-        Self { scenery: Arc::new(scenery), facts, token, renders, work: Mutex::default(), requests }
+        Self { session: Arc::new(session), facts, token, renders, work: Mutex::default(), requests }
     }
 
     /// Answers requests until `stop` is called.
@@ -111,15 +111,15 @@ impl Server {
     /// Renders, after earlier work has ended. The work ends soon if the client disconnects.
     async fn render<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Scenery, &Work) -> Result<T> + Send + 'static,
+        work: impl FnOnce(&ViewerSession, &CancelToken) -> Result<T> + Send + 'static,
     ) -> std::result::Result<T, Failed> {
         let busy = |_| Failed(StatusCode::SERVICE_UNAVAILABLE, "the server ends".into());
         let turn = self.renders.clone().acquire_owned().await.map_err(busy)?;
-        let (scenery, wait) = (self.scenery.clone(), Wait(Arc::default()));
+        let (session, wait) = (self.session.clone(), Wait(Arc::default()));
         let own = wait.0.clone();
         self.work.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&own);
         let done = tokio::task::spawn_blocking(move || {
-            let done = work(&scenery, &own).inspect_err(|error| scenery.reopen_after(error));
+            let done = work(&session, &own).inspect_err(|error| session.reopen_after(error));
             drop(turn);
             done
         });
@@ -177,12 +177,12 @@ async fn whole(request: Request) -> Option<Request> {
 async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed> {
     let failed = |e: crate::base::error::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
     let nonce = guard::token().map_err(failed)?;
-    Scenery::page(&server.facts, &nonce).map(Html).map_err(failed)
+    ViewerSession::page(&server.facts, &nonce).map(Html).map_err(failed)
 }
 
 async fn pictures(State(server): Shared, body: Bytes) -> std::result::Result<Response, Failed> {
-    let look = look(&body)?;
-    let pictures = server.render(move |scenery, work| scenery.pictures(&look, work)).await?;
+    let request = view_request(&body)?;
+    let pictures = server.render(move |session, work| session.pictures(&request, work)).await?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], pictures).into_response())
 }
 
@@ -195,7 +195,7 @@ async fn progress(State(server): Shared) -> String {
 async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Vec<u8>, Failed> {
     let refused = |e: serde_json::Error| Failed(StatusCode::BAD_REQUEST, format!("not a point: {e}"));
     let point: [f64; 3] = serde_json::from_slice(&body).map_err(refused)?;
-    server.render(move |scenery, _| scenery.series(point)).await
+    server.render(move |session, work| session.series(point, work)).await
 }
 
 /// The histogram of the samples of some frames, or of the requested frame.
@@ -205,7 +205,7 @@ async fn histogram(
 ) -> std::result::Result<Response, Failed> {
     let number = |text: &String| text.parse().map_err(|_| Failed(StatusCode::BAD_REQUEST, "frame: no number".into()));
     let frame = query.get("frame").map(number).transpose()?;
-    let histogram = server.render(move |scenery, _| scenery.histogram(frame)).await?;
+    let histogram = server.render(move |session, work| session.histogram(frame, work)).await?;
     let failed = |e: serde_json::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
     let text = serde_json::to_string(&histogram).map_err(failed)?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
@@ -216,7 +216,7 @@ async fn command(
     Query(query): Query<HashMap<String, String>>,
     body: Bytes,
 ) -> std::result::Result<String, Failed> {
-    Ok(server.scenery.command(&look(&body)?, saved(&query)?))
+    Ok(server.session.command(&view_request(&body)?, saved(&query)?))
 }
 
 async fn save(
@@ -224,13 +224,13 @@ async fn save(
     Query(query): Query<HashMap<String, String>>,
     body: Bytes,
 ) -> std::result::Result<Response, Failed> {
-    let (look, saved) = (look(&body)?, saved(&query)?);
-    let file = server.render(move |scenery, work| scenery.save(&look, saved, work)).await?;
+    let (request, saved) = (view_request(&body)?, saved(&query)?);
+    let file = server.render(move |session, work| session.save(&request, saved, work)).await?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], file).into_response())
 }
 
-fn look(body: &[u8]) -> std::result::Result<Look, Failed> {
-    Look::read(body).map_err(|e| Failed(StatusCode::BAD_REQUEST, e.to_string()))
+fn view_request(body: &[u8]) -> std::result::Result<ViewRequest, Failed> {
+    ViewRequest::read(body).map_err(|e| Failed(StatusCode::BAD_REQUEST, e.to_string()))
 }
 
 /// The kind of the requested file.

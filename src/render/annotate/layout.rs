@@ -1,5 +1,9 @@
 //! Where annotations lie: margins around the volume.
 
+use crate::base::choice::serde_as_text;
+use std::fmt;
+use std::str::FromStr;
+
 /// The parts of an annotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parts {
@@ -25,6 +29,39 @@ impl Parts {
     /// All parts.
     pub const ALL: Self = Self { triad: true, scale: true, ..Self::USUAL };
 }
+
+impl FromStr for Parts {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut parts = Self::NONE;
+        for name in text.split(',') {
+            match name.trim() {
+                "all" => parts = Self::ALL,
+                "none" => parts = Self::NONE,
+                "box" => parts.bounds = true,
+                "axes" => parts.axes = true,
+                "triad" => parts.triad = true,
+                "scale" => parts.scale = true,
+                "bar" => parts.bar = true,
+                "time" => parts.time = true,
+                other => return Err(format!("'{other}' is none of all, none, box, axes, triad, scale, bar and time")),
+            }
+        }
+        Ok(parts)
+    }
+}
+
+impl fmt::Display for Parts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { bounds, axes, triad, scale, bar, time } = *self;
+        let named = [(bounds, "box"), (axes, "axes"), (triad, "triad"), (scale, "scale"), (bar, "bar"), (time, "time")];
+        let names: Vec<&str> = named.into_iter().filter(|(is_drawn, _)| *is_drawn).map(|(_, name)| name).collect();
+        f.write_str(&if names.is_empty() { "none".into() } else { names.join(",") })
+    }
+}
+
+serde_as_text!(Parts);
 
 impl Default for Parts {
     fn default() -> Self {

@@ -2,7 +2,7 @@
 //! fields also store the provenance.
 
 mod exr;
-mod film;
+mod page_encoder;
 mod movie;
 mod ours;
 mod page;
@@ -11,16 +11,17 @@ mod png;
 mod sheet;
 mod stream;
 
-#[cfg_attr(not(feature = "view"), allow(unused_imports, reason = "only the viewer needs it"))]
-pub(crate) use film::{Film, Place};
 pub use movie::MovieFormat;
 pub use ours::is_ours;
+#[cfg_attr(not(feature = "view"), allow(unused_imports, reason = "only the viewer needs it"))]
+pub(crate) use page_encoder::{BlockOfFrames, PageEncoder};
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::{Annotation, Finished};
 use super::config::RenderConfig;
 use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
+use crate::base::choice::Choice;
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};
 use crate::colour::{Rgb, Scale};
@@ -59,22 +60,6 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    /// The formats by name. The names are also the file extensions, except for the sheet.
-    pub const NAMES: [(&'static str, Self); 12] = [
-        ("png", Self::Png),
-        ("npy", Self::Npy),
-        ("y4m", Self::Y4m),
-        ("rgb24", Self::Rgb24),
-        ("gray16", Self::Gray16),
-        ("apng", Self::Apng),
-        ("sheet", Self::Sheet),
-        ("exr", Self::Exr),
-        ("mp4", Self::Movie(MovieFormat::Mp4)),
-        ("webm", Self::Movie(MovieFormat::Webm)),
-        ("gif", Self::Movie(MovieFormat::Gif)),
-        ("html", Self::Page),
-    ];
-
     /// Whether all pictures go to one file or stream at `path`.
     pub fn takes_all(self, path: &Path) -> bool {
         !matches!(self, Self::Png | Self::Exr) || path == Path::new(STANDARD)
@@ -109,12 +94,30 @@ impl PictureFormat {
             (Self::Sheet, Depth::Sixteen) => pixels(sheet::size(size, pictures)?) * size_of::<[u16; 3]>(),
             (Self::Movie(_), _) => pixels(size) * size_of::<Rgb>(),
             (Self::Png | Self::Apng, Depth::Sixteen) => pixels(size) * size_of::<[u16; 3]>(),
-            (Self::Page, _) => film::memory(size, pictures),
+            (Self::Page, _) => page_encoder::memory(size, pictures),
             (Self::Exr, _) => pixels(size) * Pixel::Light.numbers() * size_of::<f32>(),
             _ => 0,
         };
         Ok(Output::BUFFER + 2 * more) // pixels, and their compressed form
     }
+}
+
+/// The names are also the file extensions, except for the sheet.
+impl Choice for PictureFormat {
+    const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
+        ("png", Self::Png, ""),
+        ("npy", Self::Npy, ""),
+        ("y4m", Self::Y4m, ""),
+        ("rgb24", Self::Rgb24, ""),
+        ("gray16", Self::Gray16, ""),
+        ("apng", Self::Apng, ""),
+        ("sheet", Self::Sheet, ""),
+        ("mp4", Self::Movie(MovieFormat::Mp4), ""),
+        ("webm", Self::Movie(MovieFormat::Webm), ""),
+        ("gif", Self::Movie(MovieFormat::Gif), ""),
+        ("html", Self::Page, ""),
+        ("exr", Self::Exr, ""),
+    ];
 }
 
 /// Bits per colour channel.
@@ -267,7 +270,11 @@ impl Sink {
         if path != Path::new(STANDARD) && Numbered::new(path, 1)?.digits.is_some() {
             return Err(Error::path(path, "a pattern numbers .png and .exr files; others hold all frames"));
         }
-        let out = Output::create(path, config.may_replace(path))?;
+        Self::to_output(Output::create(path, config.may_replace(path))?, config)
+    }
+
+    /// Writes all pictures to one file or stream.
+    pub(crate) fn to_output(out: Output, config: SinkConfig) -> Result<Self> {
         let target = match config.format {
             PictureFormat::Apng => Target::Animation(Animation::new(out)),
             PictureFormat::Sheet => Target::Sheet(Box::new(Sheet::new(out, &config)?)),

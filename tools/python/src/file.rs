@@ -2,37 +2,39 @@
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
 use crate::errors::raised;
+use crate::look::{Viewer, bytes, render_from};
 use crate::{described, job};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use wavesplat::Region;
 use wavesplat::base::address::is_address;
 use wavesplat::base::progress::Silent;
 use wavesplat::extract::{ExtractConfig, extract_to};
 use wavesplat::file::report::BoundReport;
 use wavesplat::file::{CoefficientFile, setting};
+use wavesplat::picture::{Inputs, Session};
 use wavesplat::remote::{Cache, RemoteOptions};
 
 /// Reads of fewer bytes end so soon that they need not be interruptible.
 const SHORT: usize = 16 << 20;
 
-/// Opens a file by its path or address.
-fn opened(path: &Path, cache_dir: Option<PathBuf>) -> wavesplat::Result<CoefficientFile> {
-    if !is_address(path) {
-        return CoefficientFile::open(path);
-    }
-    let cache = cache_dir.map(|folder| Cache::new(folder, Cache::ROOM)).transpose()?;
-    CoefficientFile::open_remote(path, &RemoteOptions { cache, ..RemoteOptions::default() })
+/// How a file is opened by its path or address.
+fn inputs(path: PathBuf, cache_dir: Option<PathBuf>) -> wavesplat::Result<Inputs> {
+    let cache = cache_dir.filter(|_| is_address(&path)).map(|folder| Cache::new(folder, Cache::ROOM)).transpose()?;
+    let remote = RemoteOptions { cache, ..RemoteOptions::default() };
+    Ok(Inputs { paths: vec![path], remote, ..Inputs::default() })
 }
 
 /// An open coefficient file; several threads may read it. Triples are in the order x, y, z.
 #[pyclass(frozen, module = "wavesplat._wavesplat")]
 pub(crate) struct File {
     file: CoefficientFile,
+    /// The same file at full detail, for pictures.
+    session: Session,
 }
 
 #[pymethods]
@@ -40,8 +42,36 @@ impl File {
     #[new]
     #[pyo3(signature = (path, lod = 0, cache_dir = None))]
     fn new(py: Python<'_>, path: PathBuf, lod: u32, cache_dir: Option<PathBuf>) -> PyResult<Self> {
-        let file = py.detach(|| opened(&path, cache_dir)?.with_detail(lod)).map_err(raised)?;
-        Ok(Self { file })
+        let open = || {
+            let inputs = inputs(path, cache_dir)?;
+            let whole = match is_address(&inputs.paths[0]) {
+                true => CoefficientFile::open_remote(&inputs.paths[0], &inputs.remote)?,
+                false => CoefficientFile::open(&inputs.paths[0])?,
+            };
+            let session = Session::from_file(whole.clone(), inputs, 0);
+            Ok(Self { file: whole.with_detail(lod)?, session })
+        };
+        py.detach(open).map_err(raised)
+    }
+
+    /// Makes the pictures of a request, given as JSON. `memory` is a size such as 512MiB.
+    #[pyo3(signature = (request, output, memory, report = None))]
+    fn render(
+        &self,
+        py: Python<'_>,
+        request: &str,
+        output: PathBuf,
+        memory: &str,
+        report: Option<Py<PyAny>>,
+    ) -> PyResult<()> {
+        let session = self.session.with_memory(bytes(memory).map_err(raised)?);
+        render_from(py, &session, request, output, report)
+    }
+
+    /// Starts a viewer, whose pictures have the settings of a request.
+    fn view(&self, py: Python<'_>, request: &str, port: u16, memory: &str) -> PyResult<Viewer> {
+        let session = self.session.with_memory(bytes(memory).map_err(raised)?);
+        Viewer::new(py, session, request, port)
     }
 
     #[getter]

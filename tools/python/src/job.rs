@@ -7,8 +7,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
+use wavesplat::base::cancel::CancelToken;
 use wavesplat::base::progress::Progress;
-use wavesplat::cli::render::Work;
 
 /// The time between two looks at the work.
 const LOOK: Duration = Duration::from_millis(50);
@@ -57,7 +57,7 @@ pub(crate) fn run<T: Send>(
     report: Option<&Py<PyAny>>,
     work: impl FnOnce(&dyn Progress, Caller) -> wavesplat::Result<T> + Send,
 ) -> PyResult<T> {
-    let (job, (calls, called)) = (Work::default(), channel());
+    let (job, (calls, called)) = (CancelToken::default(), channel());
     let caller = Caller { calls, raised: Arc::default() };
     let raised_by_calls = caller.raised.clone();
     let (done, raising) = py.detach(|| {
@@ -78,7 +78,7 @@ pub(crate) fn run<T: Send>(
 }
 
 /// Makes calls and reports progress until the work has ended. Returns the exception that cancelled it.
-fn serve(called: &Receiver<Call>, job: &Work, report: Option<&Py<PyAny>>) -> Option<PyErr> {
+fn serve(called: &Receiver<Call>, job: &CancelToken, report: Option<&Py<PyAny>>) -> Option<PyErr> {
     let (mut raising, mut looked) = (None, Instant::now());
     loop {
         match called.recv_timeout(LOOK) {
@@ -94,7 +94,7 @@ fn serve(called: &Receiver<Call>, job: &Work, report: Option<&Py<PyAny>>) -> Opt
     }
 }
 
-fn look(py: Python<'_>, job: &Work, report: Option<&Py<PyAny>>) -> PyResult<()> {
+fn look(py: Python<'_>, job: &CancelToken, report: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
     report.map_or(Ok(()), |report| report.call1(py, job.counts()).map(drop))
 }

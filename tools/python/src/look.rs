@@ -4,18 +4,44 @@
 use crate::errors::raised;
 use crate::job;
 use pyo3::prelude::*;
-use std::ffi::OsString;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
-use wavesplat::cli::render::run_within;
+use wavesplat::Error;
+use wavesplat::cli::Size;
 use wavesplat::cli::view::{self, Serving};
+use wavesplat::picture::{self, Caller, Inputs, PictureRequest, Session, ViewerSession};
 
-/// Does what words after `wavesplat-render` ask for.
+/// Makes the pictures of a request, given as JSON, from files. `memory` is a size such as 512MiB.
 #[pyfunction]
-#[pyo3(signature = (words, report = None))]
-pub(crate) fn render(py: Python<'_>, words: Vec<OsString>, report: Option<Py<PyAny>>) -> PyResult<()> {
-    job::run(py, report.as_ref(), |progress, _| run_within(words, progress))
+#[pyo3(signature = (inputs, request, output, memory, report = None))]
+pub(crate) fn render(
+    py: Python<'_>,
+    inputs: Vec<PathBuf>,
+    request: &str,
+    output: PathBuf,
+    memory: &str,
+    report: Option<Py<PyAny>>,
+) -> PyResult<()> {
+    let session = Session::new(Inputs { paths: inputs, ..Inputs::default() }, bytes(memory).map_err(raised)?);
+    render_from(py, &session, request, output, report)
+}
+
+/// Makes the pictures of a request from what is open.
+pub(crate) fn render_from(
+    py: Python<'_>,
+    session: &Session,
+    request: &str,
+    output: PathBuf,
+    report: Option<Py<PyAny>>,
+) -> PyResult<()> {
+    let request = PictureRequest { output, ..PictureRequest::from_json(request).map_err(raised)? };
+    job::run(py, report.as_ref(), |progress, _| picture::run(session, &request, &Caller(progress))?.end)
+}
+
+/// Bytes of a size such as 512MiB.
+pub(crate) fn bytes(memory: &str) -> wavesplat::Result<usize> {
+    memory.parse().map(|size: Size| size.0).map_err(|what| Error::Usage(format!("--memory: {what}")))
 }
 
 /// A viewer that answers the browser until it is closed.
@@ -26,17 +52,19 @@ pub(crate) struct Viewer {
     address: String,
 }
 
-#[pymethods]
 impl Viewer {
-    #[new]
-    fn new(py: Python<'_>, path: PathBuf, port: u16, memory: usize, options: Vec<OsString>) -> PyResult<Self> {
-        let scenery = view::scenery(&[path], memory, options);
-        let at = (IpAddr::V4(Ipv4Addr::LOCALHOST), port);
-        let viewer = py.detach(|| view::Viewer::new(scenery, at, None)).map_err(raised)?;
+    pub(crate) fn new(py: Python<'_>, session: Session, request: &str, port: u16) -> PyResult<Self> {
+        let request = PictureRequest::from_json(request).map_err(raised)?;
+        let session = ViewerSession::new(session, request, Vec::new());
+        let localhost = IpAddr::V4(Ipv4Addr::LOCALHOST);
+        let viewer = py.detach(|| view::Viewer::new(session, localhost, port, None)).map_err(raised)?;
         let address = viewer.address.clone();
         Ok(Self { serving: Mutex::new(Some(viewer.serve_aside())), address })
     }
+}
 
+#[pymethods]
+impl Viewer {
     fn open_browser(&self) {
         view::open_browser(&self.address);
     }

@@ -18,7 +18,7 @@ from . import _wavesplat
 from ._description import Axes, coordinates
 from ._figure import Figure
 from ._index import read_into, select
-from ._options import in_python, words
+from ._options import in_python, request
 from ._progress import Progress, reporting
 
 MEMORY = 512 << 20
@@ -289,7 +289,7 @@ class File:
 
         Args:
             progress: Whether to show progress, or a function of (done, all).
-            options: Those of ``wavesplat-render`` with underscores: ``view=(30, 30)``, ``mode="composite"``,
+            options: Those of ``wavesplat-render`` for pictures, with underscores: ``view=(30, 30)``, ``mode="composite"``,
                 ``frames=slice(0, 8)``, ``size=(640, 480)``, ``range=(0, 1)``, ``iso="50%"``,
                 ``slice={"z": "50%"}`` (numbers are coordinates), ``colormap="RdBu"`` (names and objects of matplotlib work),
                 ``memory="1GiB"`` and so on.
@@ -334,11 +334,10 @@ class File:
             return Figure(path.read_bytes(), format, height)
 
     def _render(self, output: str, options: dict[str, Any], progress: Progress) -> None:
-        if self._lod:
-            options = {"lod": self._lod, **options}
-        if self._cache_dir:
-            options = {"cache": self._cache_dir, **options}
-        run(options, output, [self._path], progress)
+        options = {"lod": self._lod or None, **options}
+        memory = str(options.pop("memory", MEMORY))
+        with reporting(progress, "render") as report, in_python():
+            self._file.render(request(options), output, memory, report)
 
     def view(self, *, browser: bool = True, port: int = 0, memory: int = MEMORY, **options: Any) -> Viewer:
         """Opens the interactive viewer in the browser.
@@ -350,7 +349,10 @@ class File:
             options: As for `render`, for all pictures.
 
         """
-        return Viewer(self._path, words(options), port=port, memory=memory, browser=browser)
+        if not 0 <= port < 1 << 16:
+            raise ValueError(f"port: takes 0 to 65535, not {port}")
+        with in_python():
+            return Viewer(self._file.view(request(options), port, str(memory)), browser=browser)
 
 
 def pictures(options: dict[str, Any], make: Callable[[str], object]) -> npt.NDArray[Any]:
@@ -366,11 +368,10 @@ def pictures(options: dict[str, Any], make: Callable[[str], object]) -> npt.NDAr
 
 def run(options: dict[str, Any], output: str, inputs: Sequence[str], progress: Progress = False) -> None:
     """Does what options of ``wavesplat-render`` ask for; errors have the names of Python."""
-    with reporting(progress, "render") as report:
-        try:
-            _wavesplat.render([*words(options), "-o", output, "--", *inputs], report)
-        except ValueError as error:
-            raise ValueError(in_python(str(error))) from None
+    options = dict(options)
+    memory = str(options.pop("memory", MEMORY))
+    with reporting(progress, "render") as report, in_python():
+        _wavesplat.render(inputs, request(options), output, memory, report)
 
 
 class Outer:
@@ -388,11 +389,9 @@ class Outer:
 class Viewer:
     """The viewer of a file, a server on this machine. It answers until it is closed, or this object is gone."""
 
-    def __init__(self, path: str, options: Sequence[str], *, port: int, memory: int, browser: bool) -> None:
-        """Starts the server."""
-        if not 0 <= port < 1 << 16:
-            raise ValueError(f"port: takes 0 to 65535, not {port}")
-        self._viewer = _wavesplat.Viewer(path, port, memory, options)
+    def __init__(self, viewer: _wavesplat.Viewer, *, browser: bool) -> None:
+        """Of a server that answers."""
+        self._viewer = viewer
         if browser:
             self._viewer.open_browser()
 

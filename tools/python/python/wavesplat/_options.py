@@ -1,31 +1,37 @@
-"""Keyword arguments of pictures as words after ``wavesplat-render``."""
+"""Keyword arguments of pictures as the fields of a request."""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-REPEATED = ("view", "slice", "probe")
-"""Options that a list repeats. Of others it gives several values."""
+REPEATED = ("view", "slice", "probe", "probe_region")
+"""Options that have several values."""
+
+USUAL_PARTS = "box,axes,bar,time"
+"""What ``annotate=True`` draws."""
 
 
-def words(options: dict[str, Any]) -> list[str]:
-    """The words of options; None and False leave an option out, True has no value."""
-    return [word for name, value in options.items() for word in _option(name, value)]
+def request(options: dict[str, Any]) -> str:
+    """The fields of a request as JSON; None and False leave an option out."""
+    given = {name.rstrip("_"): value for name, value in options.items() if value is not None and value is not False}
+    return json.dumps({name: _field(name, value) for name, value in given.items()})
 
 
-def _option(name: str, value: Any) -> Iterable[str]:
-    option = "--" + name.rstrip("_").replace("_", "-")
-    if value is None or value is False:
-        return []
+def _field(name: str, value: Any) -> Any:
     if value is True:
-        return [option]
-    if isinstance(value, list) and name in REPEATED:
-        return [word for one in value for word in _option(name, one)]
-    return [f"{option}={_text(name, value)}"]
+        return USUAL_PARTS if name == "annotate" else True
+    if name in REPEATED:
+        texts = [_text(name, one) for one in (value if isinstance(value, list) else [value])]
+        return [one for text in texts for one in text.split(",")] if name == "slice" else texts
+    if isinstance(value, (int, float, np.number)) and name != "frames":
+        return value.item() if isinstance(value, np.generic) else value
+    return _text(name, value)
 
 
 def _text(name: str, value: Any) -> str:
@@ -73,6 +79,11 @@ def colours(given: Any) -> str:
     return ",".join(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in levels)
 
 
-def in_python(message: str) -> str:
-    """An error with options by their names in Python: ``--splat-error`` is ``splat_error``."""
-    return re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), message)
+@contextmanager
+def in_python() -> Iterator[None]:
+    """Raises errors with options by their names in Python: ``--splat-error`` is ``splat_error``."""
+    try:
+        yield
+    except ValueError as error:
+        named = re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), str(error))
+        raise ValueError(named) from None

@@ -118,7 +118,7 @@ TOGETHER = 8
 OF_SUMS = ("colormap", "range", "norm", "clear", "background", "bar_title", "theme")
 """Options of colours: parts of pictures have none."""
 
-OF_BOTH = ("annotate", "title", "memory", "threads")
+OF_BOTH = ("annotate", "title", "memory")
 """Options that parts of pictures and their sums have. Those of colours are for sums, and all others for parts."""
 
 
@@ -177,7 +177,7 @@ def render(
         while len(parts) > TOGETHER:
             groups = [parts[n : n + TOGETHER] for n in range(0, len(parts), TOGETHER)]
             names = [str(own / f"sum-{level}-{n}.wpart") for n in range(len(groups))]
-            limits = {name: value for name, value in of_sum.items() if name in ("memory", "threads")}
+            limits = {name: value for name, value in of_sum.items() if name == "memory"}
             pairs = zip(groups, names, strict=True)
             parts = [client.submit(_joined, group, name, limits, pure=False) for group, name in pairs]
             level += 1

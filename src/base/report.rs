@@ -1,0 +1,18 @@
+//! Reports as JSON.
+
+use super::error::{Error, Result};
+use serde::Serialize;
+
+/// The text that `--json` prints.
+pub fn report_text(report: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
+    text.map(|text| text + "\n").map_err(|e| Error::usage(format!("--json: {e}")))
+}
+
+/// The object that `--json` prints. If the meaning of a key changes, so does `schema`.
+#[derive(Debug, Serialize)]
+struct Versioned<'a, T> {
+    schema: u32,
+    #[serde(flatten)]
+    report: &'a T,
+}

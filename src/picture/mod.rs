@@ -1,0 +1,43 @@
+//! From a request to pictures, partial sums or time series: what `wavesplat-render`, the viewer and Python share.
+//!
+//! A [`PictureRequest`] says what is asked for, in plain data. A [`Session`] holds what pictures are made of. [`run`]
+//! resolves the request against it ([`plan`]), renders and writes.
+
+mod reporter;
+pub mod values;
+mod request;
+mod session;
+mod units;
+mod axes;
+mod modes;
+mod targets;
+mod camera_path;
+mod annotations;
+mod views;
+mod planes;
+mod report;
+mod ranges;
+mod colours;
+mod config;
+mod opened;
+mod colouring;
+mod provenance;
+pub(crate) mod speed;
+mod sinks;
+mod plan;
+mod run;
+mod partial;
+mod series;
+mod view_request;
+mod viewer;
+
+pub use reporter::{Caller, Reporter};
+pub use request::{PictureRequest, option};
+pub use run::{Outcome, run};
+pub use session::{Inputs, Session};
+pub use view_request::ViewRequest;
+pub use viewer::{Saved, ViewerSession};
+
+pub(crate) use colours::colours_of_source;
+pub(crate) use request::exclude;
+pub(crate) use session::is_coefficient_name;

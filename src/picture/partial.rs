@@ -1,0 +1,340 @@
+//! Partial sums of pictures: what some voxels or frames add to them, and pictures of such sums.
+
+use super::annotations::{annotation, axes_of_region, note_scale, note_title};
+use super::colouring::{ColouredPictures, ColouringInput};
+use super::config::{frames_of, render_config};
+use super::modes::{check_slices, mode_name};
+use super::opened::Opened;
+use super::provenance::provenance;
+use super::ranges::{Needed, Ranges};
+use super::report::{Reported, note_errors, summary, unit, written};
+use super::reporter::Reporter;
+use super::request::PictureRequest;
+use super::run::Outcome;
+use super::session::Session;
+use super::sinks::SinkInput;
+use super::targets::AllTargets;
+use super::values::ModeName;
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::inputs::spare_inputs;
+use crate::base::output::Output;
+use crate::base::report::report_text;
+use crate::file::shard::Standing;
+use crate::file::{CoefficientFile, setting};
+use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
+use crate::render::sink::Provenance;
+use crate::render::{Limit, RenderConfig, RenderReport, SplatSource, Sums, render_sums};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// The report of `--json` about a part.
+#[derive(Serialize)]
+struct PartReport<'a> {
+    #[serde(flatten)]
+    report: &'a RenderReport,
+    /// The voxels of the part: the first, and the end (exclusive), along x, y, z.
+    voxels: Region,
+    /// The frames of the part, as the archive numbers them.
+    frame_numbers: &'a [usize],
+    file_bytes_read: u64,
+    file_bytes: u64,
+}
+
+/// The report of `--json` about a sum.
+#[derive(Serialize)]
+struct SumReport<'a> {
+    #[serde(flatten)]
+    pictures: &'a Reported<'a>,
+    #[serde(flatten)]
+    summed: Summed,
+}
+
+/// The parts that make up a sum.
+#[derive(Serialize)]
+struct Summed {
+    parts: usize,
+    /// The share of the lattice's voxels that the parts have.
+    covered: f64,
+}
+
+impl Summed {
+    fn new(total: &Total) -> Self {
+        Self { parts: total.parts(), covered: total.covered() }
+    }
+}
+
+/// A part before its first sums.
+struct Planned {
+    look: Look,
+    source: Source,
+    /// The settings, with frames as the file numbers them.
+    config: RenderConfig,
+    /// The numbers of the views in `config`, as the look has them.
+    views: Vec<usize>,
+    voxels: Region,
+}
+
+/// Sets what the first of some partial sums says of their pictures.
+pub(super) fn imply_setup(request: &PictureRequest, inputs: &[PathBuf], memory: usize) -> Result<PictureRequest> {
+    let Some(first) = inputs.first() else { return Ok(request.clone()) };
+    let look = PartFile::open(first, memory)?.head.look;
+    let mut request = request.clone();
+    request.size.0 = look.views[0].size;
+    request.tolerance = look.tolerance.map(|(share, _)| share);
+    request.method = if look.direct { SplatSource::Samples } else { SplatSource::Coefficients };
+    request.quantity = look.quantity;
+    Ok(request)
+}
+
+/// The file of a partial sum that is to be written.
+fn partial_output(request: &PictureRequest, inputs: &[PathBuf]) -> Result<Output> {
+    spare_inputs(inputs, &request.output)?;
+    Output::create(&request.output, request.force || is_part(&request.output))
+}
+
+/// Writes a partial sum.
+pub(super) fn write_partial(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Outcome> {
+    check_slices(request)?;
+    refuse_for_partial(request)?;
+    let opened = Opened::new(session, request, reporter)?;
+    let Some(file) = opened.file.clone() else {
+        return Err(Error::usage("--partial: takes a coefficient file, not frames; convert them first"));
+    };
+    let Planned { look, source, config, views, voxels } = plan_partial(request, &opened, &file, session.memory)?;
+    let first = source.frames[0];
+    let frames: Vec<usize> = config.frames.iter().map(|frame| frame + first).collect();
+    let output = (request.output.as_path(), partial_output(request, session.paths())?);
+    let mut writer = PartWriter::new(output, look, (vec![voxels], vec![source]))?;
+    let (progress, mut scene) = (reporter.progress("render", unit(&config.mode)), opened.scene);
+    let report = match frames.is_empty() {
+        true => {
+            reporter.note(format_args!("the file has none of these frames, so the part is empty"));
+            RenderReport::default()
+        }
+        false => render_sums(scene.as_mut(), &config, progress.as_ref(), &mut |sums| {
+            writer.put(numbered(sums, &views, first))
+        })?,
+    };
+    let skipped = file.refuse_skipped();
+    let damage = skipped.as_ref().err().map(ToString::to_string);
+    writer.finish(report.certified_sample_error, damage)?.commit()?;
+    reporter.detail(format_args!("{}", summary(&report)));
+    reporter.detail_read(file.bytes_read(), file.bytes());
+    let (file_bytes_read, file_bytes) = (file.bytes_read(), file.bytes());
+    let of_part = PartReport { report: &report, voxels, frame_numbers: &frames, file_bytes_read, file_bytes };
+    Ok(Outcome { report: report_text(&of_part)?, is_on_stdout: false, end: skipped })
+}
+
+/// An error if the pictures are not sums.
+fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
+    let instead = "render them whole, perhaps with --lod, or each shard of time by itself: its frames are whole";
+    let what = match mode_name(request) {
+        ModeName::Projection if request.error == Limit::Expected && request.tolerance.is_some() => {
+            return Err(Error::usage(
+                "--error expected: weighs all blocks of a picture, and a part has some; take certified",
+            ));
+        }
+        ModeName::Projection => return Ok(()),
+        ModeName::Mip => "largest values along rays are no sums, and lie between voxels on both sides of a border",
+        ModeName::Composite => "near samples hide far ones, so composites are no sums",
+        ModeName::Iso => "near surfaces hide far ones, so they are no sums",
+        ModeName::Slice => "slices are no sums, and show single samples; --region is not needed for them",
+    };
+    Err(Error::usage(format!("--partial: {what}; {instead}")))
+}
+
+/// Plans a partial sum: the settings that all parts share, and its own views, frames and voxels.
+fn plan_partial(request: &PictureRequest, opened: &Opened, file: &CoefficientFile, memory: usize) -> Result<Planned> {
+    let (standing, scene) = (Standing::of(file)?, opened.scene.as_ref());
+    let mut config = render_config(request, scene, Some(file), None, standing.all, memory)?;
+    let look = shared_setup(request, opened, file, &config, &standing);
+    let frames = [standing.frames.start, standing.frames.end];
+    let source = Source { file: file.id().to_string(), frames, times: file.metadata().times.clone() };
+    let voxels = config.region.unwrap_or(scene.grid().whole());
+    let held = |frame: &usize| standing.frames.contains(frame);
+    let of_view = |view: &usize| !config.paired || held(&config.frames[*view]);
+    let views: Vec<usize> = (0..config.views.len()).filter(of_view).collect();
+    config.views = views.iter().map(|view| config.views[*view]).collect();
+    config.frames.retain(held);
+    config.frames.iter_mut().for_each(|frame| *frame -= frames[0]);
+    Ok(Planned { look, source, config, views, voxels })
+}
+
+/// The settings that all parts of a picture share.
+fn shared_setup(
+    request: &PictureRequest,
+    opened: &Opened,
+    file: &CoefficientFile,
+    config: &RenderConfig,
+    standing: &Standing,
+) -> Look {
+    let (scene, m) = (opened.scene.as_ref(), file.metadata());
+    Look {
+        archive: standing.archive.clone(),
+        frames: standing.all,
+        channels: scene.channels(),
+        grid: *scene.grid(),
+        block: scene.blocks().edges,
+        whole: file.whole_grid(),
+        lod: file.lod(),
+        exaggeration: opened.exaggeration,
+        direct: request.method == SplatSource::Samples,
+        quantity: config.quantity,
+        kernel: config.kernel,
+        splat_error: config.splat_error,
+        quick: config.quick,
+        tolerance: request.tolerance.zip(config.allowed),
+        views: config.views.clone(),
+        paired: config.paired.then(|| config.frames.clone()),
+        values: opened.annotation.values.clone(),
+        axes: opened.axes.labels(),
+        time_unit: setting(m, "time-units").unwrap_or_default().into(),
+        calendar: setting(m, "calendar").map(Into::into),
+    }
+}
+
+/// Adds partial sums: to pictures, or to one partial sum.
+pub(super) fn add_partials(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Outcome> {
+    let progress = reporter.progress("parts", "parts");
+    let total = Total::open(session.paths(), session.memory, progress.as_ref())?;
+    let frames = match request.frames {
+        Some(_) => frames_of(request, total.look().frames)?,
+        None => total.frames(),
+    };
+    note_gaps(request, &total, reporter);
+    let sum = Sum { session, request, reporter, total: &total, frames: &frames };
+    let report = if request.partial { sum.write_partial()? } else { sum.write_pictures()? };
+    let lacks = |damage| Err(Error::input(&request.output, format!("lacks what a part left out: {damage}")));
+    let is_on_stdout = !request.partial && request.writes_to_stdout();
+    Ok(Outcome { report, is_on_stdout, end: total.damage().map_or(Ok(()), lacks) })
+}
+
+/// Notes which voxels and frames the parts lack.
+fn note_gaps(request: &PictureRequest, total: &Total, reporter: &dyn Reporter) {
+    if !total.is_whole() {
+        let percent = 100.0 * total.covered();
+        reporter.note(format_args!("the parts have {percent:.3} % of the voxels; pictures show these alone"));
+    }
+    let mut next = 0;
+    let ends = [total.look().frames; 2];
+    for [first, behind] in total.sources().iter().map(|of| of.frames).chain([ends]) {
+        if next < first && request.frames.is_none() {
+            reporter.note(format_args!("no part was made of the frames {next}:{first}"));
+        }
+        next = next.max(behind);
+    }
+}
+
+/// Partial sums that are added.
+struct Sum<'a> {
+    session: &'a Session,
+    request: &'a PictureRequest,
+    reporter: &'a dyn Reporter,
+    total: &'a Total,
+    frames: &'a [usize],
+}
+
+impl Sum<'_> {
+    /// Writes one partial sum. Returns its report.
+    fn write_partial(&self) -> Result<String> {
+        let progress = self.reporter.progress("sum", "pictures");
+        let output = (self.request.output.as_path(), partial_output(self.request, self.session.paths())?);
+        self.total.join(self.frames, output, progress.as_ref())?.commit()?;
+        report_text(&Summed::new(self.total))
+    }
+
+    /// Writes pictures. Returns their report.
+    fn write_pictures(&self) -> Result<String> {
+        let Self { request, reporter, total, .. } = *self;
+        let progress = reporter.progress("sum", "pictures");
+        let config = total.config(self.frames, self.session.memory)?;
+        let targets = AllTargets::new(request, self.session.paths(), &config)?;
+        self.check_memory(&targets, &config)?;
+        let look = total.look();
+        let input = ColouringInput {
+            request,
+            channels: look.channels,
+            config: &config,
+            pictures: &targets.pictures,
+            errors: None,
+            colours: None,
+        };
+        let ranges = |needed: Needed| if needed.of_pictures { self.ranges() } else { Ok(Ranges::default()) };
+        let colouring = input.colouring(ranges, reporter)?;
+        let mut annotation = annotation(request, look.values.clone(), total.time_labels());
+        let provenance = provenance(request, &look.grid, &config, None, &annotation.times, &colouring);
+        let provenance = with_parts(provenance, total);
+        annotation.axes = Some(axes_of_region(look.axes.clone(), &look.whole, whole_voxels(total), &config));
+        note_scale(&annotation, reporter);
+        note_title(request, &annotation, &config, reporter);
+        let (targets, annotation) = (&targets, &annotation);
+        let sinks =
+            SinkInput { request, config: &config, targets, colouring: &colouring, provenance: &provenance, annotation };
+        let mut sinks = sinks.open()?;
+        let report = total.render(self.frames, progress.as_ref(), &mut |rendered| sinks.picture(&rendered))?;
+        sinks.finish()?;
+        let (parts, shown, seconds) = (total.parts(), config.shown().len(), report.seconds);
+        reporter.detail(format_args!("{parts} parts added to {shown} pictures in {seconds:.3} s"));
+        note_errors(request, &report, reporter);
+        self.report(&report, &provenance, colouring.coloured())
+    }
+
+    fn report(&self, report: &RenderReport, picture: &Provenance, coloured: ColouredPictures) -> Result<String> {
+        let pictures = &Reported { report, picture, coloured, file_bytes_read: None, file_bytes: None };
+        written(self.request, &SumReport { pictures, summed: Summed::new(self.total) })
+    }
+
+    fn check_memory(&self, targets: &AllTargets, config: &RenderConfig) -> Result<()> {
+        let of_targets = targets.pictures.memory(self.request.depth, config)?;
+        let needed = self.total.least_memory().saturating_add(of_targets);
+        if needed <= self.session.memory {
+            return Ok(());
+        }
+        let mib = needed.div_ceil(1 << 20);
+        Err(Error::setting("memory", format!("sums and their pictures need at least {mib}MiB")))
+    }
+
+    /// The ranges of the pictures of a few frames.
+    fn ranges(&self) -> Result<Ranges> {
+        let progress = self.reporter.progress("range", "pictures");
+        Ranges::of_pictures(self.frames, |some, give| {
+            self.total.render(some, progress.as_ref(), &mut |rendered| {
+                give(rendered.picture);
+                Ok(())
+            })?;
+            Ok(())
+        })
+    }
+}
+
+/// Sums with the numbers that views and frames have in the archive.
+fn numbered<'a>(sums: Sums<'a>, views: &[usize], first: usize) -> Sums<'a> {
+    match sums {
+        Sums::Weights { view, sums } => Sums::Weights { view: views[view], sums },
+        Sums::Picture { view, frame, planes, missing } => {
+            Sums::Picture { view: views[view], frame: frame + first, planes, missing }
+        }
+    }
+}
+
+/// The voxels of a sum, on the lattice of all voxels.
+fn whole_voxels(total: &Total) -> Region {
+    let (look, Region { start, end }) = (total.look(), total.bounds());
+    let step = 1 << look.lod;
+    let last = |axis: usize| (end[axis] * step).min(look.whole.dims[axis]);
+    Region { start: start.map(|n| n * step), end: [0, 1, 2].map(last) }
+}
+
+/// Adds the settings stored in the parts.
+fn with_parts(provenance: Provenance, total: &Total) -> Provenance {
+    let (look, sources) = (total.look(), total.sources());
+    Provenance {
+        lod: Some(look.lod).filter(|lod| *lod > 0),
+        exaggerate: Some(look.exaggeration).filter(|factor| *factor != 1.0),
+        region: (!total.is_whole()).then(|| total.bounds().to_string()),
+        sample_error: Some(total.sample_error()),
+        file_id: (sources.len() == 1).then(|| sources[0].file.clone()),
+        ..provenance
+    }
+}

@@ -1,0 +1,75 @@
+//! A request resolved against what it draws: from names to numbers, places, colours and files.
+
+use super::annotations::{note_scale, note_title, volume_axes};
+use super::colouring::{Colouring, ColouringInput, automatic_colours, note_surfaces};
+use super::config::render_config;
+use super::modes::check_slices;
+use super::opened::Opened;
+use super::planes::{set_planes, slice_texts};
+use super::provenance::provenance;
+use super::ranges::Ranges;
+use super::reporter::Reporter;
+use super::request::PictureRequest;
+use super::session::Session;
+use super::sinks::SinkInput;
+use super::targets::AllTargets;
+use crate::base::error::Result;
+use crate::file::CoefficientFile;
+use crate::render::annotate::Annotation;
+use crate::render::sink::Provenance;
+use crate::render::{RenderConfig, Scene};
+use std::sync::Arc;
+
+/// Everything that rendering needs, opened and chosen.
+pub(super) struct Plan {
+    pub(super) scene: Box<dyn Scene>,
+    /// The coefficient file of the scene.
+    pub(super) file: Option<Arc<CoefficientFile>>,
+    pub(super) config: RenderConfig,
+    pub(super) targets: AllTargets,
+    pub(super) colouring: Colouring,
+    pub(super) provenance: Provenance,
+    pub(super) annotation: Annotation,
+}
+
+impl Plan {
+    /// Opens the scene of a request, and chooses the settings and colours of its pictures.
+    pub(super) fn new(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Self> {
+        check_slices(request)?;
+        let Opened { mut scene, file, exaggeration, annotation, colours, axes } =
+            Opened::new(session, request, reporter)?;
+        let all = scene.frames().unwrap_or(0);
+        let mut config =
+            render_config(request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, session.memory)?;
+        let (whole, lod) = file.as_ref().map_or((*scene.grid(), 0), |file| (file.whole_grid(), file.lod()));
+        set_planes(&mut config, request, &axes, scene.grid(), &whole, lod)?;
+        let targets = AllTargets::new(request, session.paths(), &config)?;
+        config.memory = targets.memory_besides(scene.as_ref(), request.depth, &config)?;
+        let colours = automatic_colours(request, scene.as_mut(), &mut config, colours, reporter)?;
+        note_surfaces(&config, file.as_deref(), reporter);
+        let input = ColouringInput {
+            request,
+            channels: scene.channels(),
+            config: &config,
+            pictures: &targets.pictures,
+            errors: targets.errors.as_ref(),
+            colours: colours.as_ref(),
+        };
+        let colouring = input.colouring(|needed| Ranges::small(scene.as_mut(), &config, needed, reporter), reporter)?;
+        let provenance = Provenance {
+            slice: slice_texts(request, &axes)?,
+            exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
+            ..provenance(request, scene.grid(), &config, file.as_deref(), &annotation.times, &colouring)
+        };
+        let annotation = Annotation { axes: Some(volume_axes(request, &axes, &whole, &config)?), ..annotation };
+        note_scale(&annotation, reporter);
+        note_title(request, &annotation, &config, reporter);
+        Ok(Self { scene, file, config, targets, colouring, provenance, annotation })
+    }
+
+    /// What the sinks of the pictures need.
+    pub(super) fn sinks<'a>(&'a self, request: &'a PictureRequest) -> SinkInput<'a> {
+        let Self { config, targets, colouring, provenance, annotation, .. } = self;
+        SinkInput { request, config, targets, colouring, provenance, annotation }
+    }
+}

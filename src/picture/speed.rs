@@ -1,0 +1,30 @@
+//! The frames per second of movies.
+
+use super::request::PictureRequest;
+use crate::base::error::{Error, Result};
+use crate::base::time_labels::TimeLabels;
+use crate::render::RenderConfig;
+
+/// The least and the largest number of frames per second.
+pub(crate) const SLOWEST: f64 = 0.02;
+pub(crate) const FASTEST: f64 = 1000.0;
+
+/// The frames per second of movies: as asked for, or by the speed of the data's time.
+pub(super) fn frames_per_second(request: &PictureRequest, config: &RenderConfig, times: &TimeLabels) -> Result<f64> {
+    let Some(speed) = request.speed else { return Ok(request.fps) };
+    let time = |frame: Option<&usize>| frame.and_then(|frame| times.times().get(*frame)).copied();
+    let (Some(first), Some(last)) = (time(config.frames.first()), time(config.frames.last())) else {
+        return Err(Error::usage("--speed: the data has no times; take --fps"));
+    };
+    if last <= first {
+        return Err(Error::usage("--speed: no time passes in these frames; take --fps"));
+    }
+    let steps = (config.frames.len() - 1) as f64;
+    let fps = speed * steps / (last - first);
+    if !(SLOWEST..=FASTEST).contains(&fps) {
+        let sensible = 25.0 / steps * (last - first);
+        let what = format!("would show {fps:.3e} frames per second, not {SLOWEST} to {FASTEST}");
+        return Err(Error::usage(format!("--speed {speed}: {what}; --speed {sensible:.3e} shows 25")));
+    }
+    Ok(fps)
+}

@@ -1,0 +1,15 @@
+//! Values of a request, each with the text that options and files of options accept.
+
+mod automatic;
+mod choices;
+mod hex_colour;
+mod position;
+mod surfaces;
+mod view_angles;
+
+pub use automatic::{ClearSpec, Detail, Exaggeration};
+pub use choices::{ModeName, Theme};
+pub use hex_colour::HexColour;
+pub use position::{AxisPosition, PointSpec, SliceSpec};
+pub use surfaces::SurfaceList;
+pub use view_angles::ViewAngles;
