@@ -110,11 +110,6 @@ impl Mode {
         }
     }
 
-    /// Whether planes are shown within a volume.
-    pub(super) fn has_planes(&self) -> bool {
-        matches!(self, Self::Composite { planes, .. } if !planes.is_empty())
-    }
-
     /// An error if the mode's own settings cannot be used.
     fn check(&self) -> Result<()> {
         match self {
@@ -181,7 +176,7 @@ pub enum Limit {
     Expected,
 }
 
-// `RenderConfig::new` is in scene.rs, because the defaults depend on the scene.
+// `RenderConfig::new` is in batches/scene.rs, because the defaults depend on the scene.
 impl RenderConfig {
     /// Width and height of the pictures.
     pub(super) fn size(&self) -> [usize; 2] {

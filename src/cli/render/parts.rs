@@ -18,7 +18,7 @@ use crate::file::{CoefficientFile, setting};
 use crate::render::annotate::AxisLabels;
 use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
 use crate::render::sink::Provenance;
-use crate::render::{Quantity, RenderConfig, RenderReport, Scene, Sums, render_sums};
+use crate::render::{PartialSums, Quantity, RenderConfig, RenderReport, Scene, render_sums};
 use clap::Args;
 use serde::Serialize;
 
@@ -303,11 +303,11 @@ impl Cli {
 }
 
 /// Sums with the numbers that views and frames have in the archive.
-fn numbered<'a>(sums: Sums<'a>, views: &[usize], first: usize) -> Sums<'a> {
+fn numbered<'a>(sums: PartialSums<'a>, views: &[usize], first: usize) -> PartialSums<'a> {
     match sums {
-        Sums::Weights { view, sums } => Sums::Weights { view: views[view], sums },
-        Sums::Picture { view, frame, planes, missing } => {
-            Sums::Picture { view: views[view], frame: frame + first, planes, missing }
+        PartialSums::Weights { view, sums } => PartialSums::Weights { view: views[view], sums },
+        PartialSums::Picture { view, frame, planes, missing } => {
+            PartialSums::Picture { view: views[view], frame: frame + first, planes, missing }
         }
     }
 }

@@ -18,8 +18,8 @@ pub use ours::is_ours;
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::{Annotation, Finished};
+use super::batches::scene::Scene;
 use super::config::RenderConfig;
-use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::output::{Numbered, Output, STANDARD};

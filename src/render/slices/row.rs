@@ -1,8 +1,8 @@
 //! A row of cells in a slice: means and lengths, sixteen cells at a time, and the ways to combine the slices.
 
 use super::filter::{Sixteen, weighted_rows};
-use super::units::Units;
 use super::{GROUP, stops};
+use crate::render::batches::units::Units;
 
 /// Sums along a and b of a row of cells, from the first row of voxels on that the weights along c meet.
 #[derive(Clone, Copy)]
@@ -187,6 +187,11 @@ pub(in crate::render) trait Blend: Sync {
     /// Whether the gradient of the field is needed.
     fn is_shaded(&self) -> bool {
         false
+    }
+
+    /// The largest error of tabulated colours in the light of a slice, if there is a table.
+    fn table_error(&self) -> Option<f64> {
+        None
     }
 
     /// Whether any value in this range is visible.
