@@ -60,12 +60,9 @@ mod pictures;
 pub mod parts;
 
 pub use crate::wavelet::{LANES, Lane};
-pub use batches::expectation::Expectation;
-pub use batches::layout::{Layout, Order};
-pub use batches::overview::{OverviewRequest, Thinning, stride};
-pub use batches::plane_values::{BlockPlanes, PlaneValues, Scratch};
-pub use batches::scene::{
-    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
+pub use batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, Order,
+    OverviewRequest, PlaneValues, SampleErrors, Scene, Scratch, Selection, Thinning, stride,
 };
 pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use light::{Light, Surface};
@@ -129,9 +126,9 @@ pub fn render(
         Ok(())
     };
     progress.start(Some((renderer.steps() * config.frames_of_view()) as u64));
-    for (views, config) in config.groups() {
+    for task in config.tasks() {
         let mut output = Output { sink: &mut sink, report: &mut report, progress };
-        renderer.render(scene, &config, views, &mut output)?;
+        renderer.render(scene, &task, &mut output)?;
     }
     progress.finish();
     report.sum_up_expected_errors(config.frames_of_view());

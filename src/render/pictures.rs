@@ -1,6 +1,6 @@
 //! A rendering with picture files as its output.
 
-use super::batches::scene::Scene;
+use super::batches::Scene;
 use super::config::RenderConfig;
 use super::report::RenderReport;
 use super::sink::{Sink, SinkConfig};

@@ -1,11 +1,10 @@
 //! What a mode needs to render its pictures: the interface of all renderers.
 
-use super::batches::scene::Scene;
-use super::config::RenderConfig;
+use super::batches::Scene;
+use super::config::{RenderConfig, ViewTask};
 use super::report::{RenderReport, Rendered, ViewReport};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
-use std::ops::Range;
 
 /// Renders the views of one mode.
 pub(super) trait Renderer {
@@ -18,14 +17,8 @@ pub(super) trait Renderer {
     /// The steps of progress for a frame of all views: slices of pictures, or pictures.
     fn steps(&self) -> usize;
 
-    /// Renders the frames of `config` from some of the views.
-    fn render(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        views: Range<usize>,
-        output: &mut Output<'_, '_>,
-    ) -> Result<()>;
+    /// Renders some of the views.
+    fn render(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut Output<'_, '_>) -> Result<()>;
 }
 
 /// Takes pictures.

@@ -10,13 +10,26 @@
 //! samples        the samples of blocks in every frame, in some units; sampled: the modes that need them
 //! ```
 
-pub(super) mod layout;
-pub(super) mod plane_values;
-pub(super) mod read;
-pub(super) mod overview;
-pub(super) mod expectation;
-pub(super) mod scene;
-pub(super) mod driver;
-pub(super) mod units;
-pub(super) mod samples;
-pub(super) mod sampled;
+mod layout;
+mod plane_values;
+mod read;
+mod overview;
+mod expectation;
+mod scene;
+mod driver;
+mod units;
+mod samples;
+mod sampled;
+
+pub(super) use driver::{Job, RenderedBatch, for_each_batch, in_batch};
+pub use expectation::Expectation;
+pub(super) use expectation::{BlockInfluence, ViewWeights, alike};
+pub use layout::{Layout, Order};
+pub use overview::{OverviewRequest, Thinning, stride};
+pub(super) use plane_values::UnitValues;
+pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
+pub(super) use read::{BlockAdder, BlockReader, BlockSource, ReadStats};
+pub(super) use sampled::SampledView;
+pub(super) use samples::{BlockSamples, SampleReader};
+pub use scene::{BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection};
+pub(super) use units::Units;

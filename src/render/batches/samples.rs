@@ -83,13 +83,13 @@ fn samples(batch: &dyn FrameBatch, block: &dyn BlockPlanes, units: &[Units]) -> 
 
 /// The values of a plane in other units.
 fn in_units(plane: &PlaneValues<'_>, voxels: usize, units: &Units) -> Vec<f32> {
-    let mut out = vec![units.from_value(0.0); voxels];
+    let mut out = vec![units.number(0.0); voxels];
     match plane {
         PlaneValues::Nothing => {}
         PlaneValues::Single(values) => convert(values, *units, &mut out),
         PlaneValues::Double(values) => convert(values, *units, &mut out),
         PlaneValues::Few(values) => {
-            values.iter().for_each(|(voxel, value)| out[*voxel as usize] = units.from_value(*value))
+            values.iter().for_each(|(voxel, value)| out[*voxel as usize] = units.number(*value));
         }
     }
     out
@@ -97,7 +97,7 @@ fn in_units(plane: &PlaneValues<'_>, voxels: usize, units: &Units) -> Vec<f32> {
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn convert<T: Copy + Into<f64>>(values: &[T], units: Units, out: &mut [f32]) {
-    out.iter_mut().zip(values).for_each(|(out, value)| *out = units.from_value((*value).into()));
+    out.iter_mut().zip(values).for_each(|(out, value)| *out = units.number((*value).into()));
 }
 
 /// Replaces missing samples by NaN.

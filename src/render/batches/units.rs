@@ -9,7 +9,7 @@ pub(in crate::render) struct Units {
 
 impl Units {
     /// A value in these units.
-    pub(in crate::render) fn from_value(&self, value: f64) -> f32 {
+    pub(in crate::render) fn number(&self, value: f64) -> f32 {
         /// Sums of 32-bit numbers up to this do not overflow.
         const MOST: f64 = 5e37;
         ((value - self.zero) * self.per).clamp(-MOST, MOST) as f32

@@ -2,8 +2,7 @@
 
 use super::PlanesView;
 use crate::base::error::Result;
-use crate::render::batches::samples::{BlockSamples, SampleReader};
-use crate::render::batches::units::Units;
+use crate::render::batches::{BlockSamples, SampleReader, Units};
 use crate::render::report::RenderReport;
 
 /// Samples are decoded in these units, in which no 32-bit sample is out of range.

@@ -3,13 +3,10 @@
 use super::{PlanesPass, PlanesView};
 use crate::base::error::Result;
 use crate::base::grid::Grid;
-use crate::render::batches::sampled::SampledView;
-use crate::render::batches::samples::SampleReader;
-use crate::render::batches::scene::Scene;
-use crate::render::config::{Plane, RenderConfig};
+use crate::render::batches::{SampleReader, SampledView, Scene};
+use crate::render::config::{Plane, RenderConfig, ViewTask};
 use crate::render::renderer::{Output, Renderer, give};
 use crate::render::report::{RenderReport, ViewReport};
-use std::ops::Range;
 
 /// Renders planes through the volume. Progress counts pictures.
 pub(in crate::render) struct Planes {
@@ -46,17 +43,11 @@ impl Renderer for Planes {
         self.views.len()
     }
 
-    fn render(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        views: Range<usize>,
-        output: &mut Output<'_, '_>,
-    ) -> Result<()> {
+    fn render(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut Output<'_, '_>) -> Result<()> {
         let Output { sink, report, progress } = output;
-        for number in views {
+        for number in task.views.clone() {
             let view = &self.views[number];
-            let config = RenderConfig { region: Some(view.needed()), ..config.clone() };
+            let config = RenderConfig { region: Some(view.needed()), ..task.config.clone() };
             let sampled = SampledView { config: &config, frame_bytes: &|frames| view.bytes(frames) };
             let render =
                 |reader: &SampleReader<'_>, report: &mut RenderReport| PlanesPass { view, reader }.pictures(report);

@@ -20,7 +20,7 @@
 
 use super::weight_sums::PixelWeight;
 use crate::base::sample::magnitude;
-use crate::render::batches::scene::FrameBounds;
+use crate::render::batches::FrameBounds;
 use crate::render::config::Quantity;
 use crate::render::splat::ViewSetup;
 use crate::view::footprint::Method;

@@ -18,10 +18,8 @@ pub(super) mod reconstruct;
 mod bands;
 pub(super) mod partial_sums;
 
-use super::batches::driver::{Job, RenderedBatch, for_each_batch};
-use super::batches::expectation::Expectation;
-use super::batches::scene::{FrameBatch, Scene};
-use super::config::RenderConfig;
+use super::batches::{Expectation, FrameBatch, Job, RenderedBatch, Scene, for_each_batch};
+use super::config::{RenderConfig, ViewTask};
 use super::renderer::{Output, PictureSink, Renderer};
 use super::report::{RenderReport, Rendered, ViewReport, lap};
 use super::splat::{Pixels, ResolvedTile, ViewSetup};
@@ -35,7 +33,6 @@ use plan::{Budget, Kept};
 use reconstruct::PixelReconstructor;
 use splat_weights::splat_weights;
 use std::borrow::Cow;
-use std::ops::Range;
 use std::time::Instant;
 
 /// Renders projections, as many views together as fit in memory. Progress counts pictures.
@@ -70,13 +67,8 @@ impl Renderer for Projection {
         self.setups.len()
     }
 
-    fn render(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        views: Range<usize>,
-        output: &mut Output<'_, '_>,
-    ) -> Result<()> {
+    fn render(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut Output<'_, '_>) -> Result<()> {
+        let ViewTask { views, config } = task;
         let mut first = views.start;
         while first < views.end {
             let budget = Budget::for_most_views(config, Kept::Value, scene, &self.setups[first..views.end]);
@@ -181,13 +173,13 @@ impl Pictures {
 
     /// Picture `i` with the channels interleaved; `None` if there is no such picture.
     fn together<'a>(channels: &[&'a Self], i: usize) -> Option<Cow<'a, [f32]>> {
-        let of = |channel: &&'a Self| channel.all.get(i * channel.pixels..(i + 1) * channel.pixels);
+        let values = |channel: &&'a Self| channel.all.get(i * channel.pixels..(i + 1) * channel.pixels);
         let [first, others @ ..] = channels else { return None };
-        let first = of(first)?;
+        let first = values(first)?;
         if others.is_empty() {
             return Some(first.into());
         }
-        let others: Vec<&[f32]> = others.iter().filter_map(of).collect();
+        let others: Vec<&[f32]> = others.iter().filter_map(values).collect();
         let pixel = |(at, value): (usize, &f32)| std::iter::once(*value).chain(others.iter().map(move |c| c[at]));
         Some(first.iter().enumerate().flat_map(pixel).collect())
     }

@@ -17,13 +17,11 @@ use super::splat_weights::splat_part_weights;
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
 use crate::base::zeroed::Zeroed;
-use crate::render::batches::driver::{Job, for_each_batch};
-use crate::render::batches::scene::{FrameBatch, Scene};
-use crate::render::config::RenderConfig;
+use crate::render::batches::{FrameBatch, Job, Scene, for_each_batch};
+use crate::render::config::{RenderConfig, ViewTask};
 use crate::render::renderer::{Renderer, check_memory};
 use crate::render::report::{RenderReport, lap};
 use crate::render::splat::{Pixels, ResolvedTile, ViewSetup};
-use std::ops::Range;
 use std::time::Instant;
 
 /// Sums of all pixels of a view, row by row.
@@ -68,9 +66,9 @@ pub fn render_sums(
     let views = projection.reports(config);
     let mut report = RenderReport { frames: config.frames.len(), views, ..RenderReport::default() };
     progress.start(Some((projection.steps() * config.frames_of_view()) as u64));
-    for (views, config) in config.groups() {
+    for task in config.tasks() {
         let mut output = PartialOutput { sink: &mut *sink, report: &mut report, progress };
-        projection.sum_views(scene, &config, views, &mut output)?;
+        projection.sum_views(scene, &task, &mut output)?;
     }
     progress.finish();
     report.views.iter_mut().for_each(|view| view.expected_error = f64::NAN); // it depends on the weights of all parts
@@ -101,13 +99,8 @@ struct PartialOutput<'a, 's> {
 
 impl Projection {
     /// Sums some of the views, as many together as fit in memory.
-    fn sum_views(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        views: Range<usize>,
-        output: &mut PartialOutput<'_, '_>,
-    ) -> Result<()> {
+    fn sum_views(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut PartialOutput<'_, '_>) -> Result<()> {
+        let ViewTask { views, config } = task;
         let PartialOutput { sink, report, progress } = output;
         let mut first = views.start;
         while first < views.end {

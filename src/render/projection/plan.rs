@@ -5,9 +5,7 @@
 
 use crate::base::grid::Region;
 use crate::base::memory;
-use crate::render::batches::driver::in_batch;
-use crate::render::batches::layout::Layout;
-use crate::render::batches::scene::Scene;
+use crate::render::batches::{Layout, Scene, in_batch};
 use crate::render::config::RenderConfig;
 use crate::render::splat::footprints::Splats;
 use crate::render::splat::sparse_terms::SparseTerms;

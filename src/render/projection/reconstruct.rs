@@ -3,8 +3,7 @@
 
 use super::certificate::Certificate;
 use super::weight_sums::{PixelWeight, WeightSums};
-use crate::render::batches::layout::Layout;
-use crate::render::batches::scene::{FrameBatch, Inverse};
+use crate::render::batches::{FrameBatch, Inverse, Layout};
 use crate::render::config::{Quantity, RenderConfig};
 use crate::render::splat::{Pixels, ResolvedTile};
 use crate::wavelet::{LANES, Lane};

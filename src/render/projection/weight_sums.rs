@@ -11,7 +11,7 @@
 
 use crate::base::error::Result;
 use crate::base::grid::Region;
-use crate::render::batches::expectation::ViewWeights;
+use crate::render::batches::ViewWeights;
 use crate::render::config::{BACKGROUND, Quantity, RenderConfig};
 use crate::render::splat::reference_weights::ReferenceWeights;
 use crate::render::splat::{FilteredCells, Ones, ViewSetup};

@@ -3,8 +3,7 @@
 use crate::base::error::Result;
 use crate::codec::WindowCodec;
 use crate::file::CoefficientFile;
-use crate::render::batches::layout::{Layout, Order};
-use crate::render::batches::scene::BatchRequest;
+use crate::render::batches::{BatchRequest, Layout, Order};
 use crate::render::config::RenderConfig;
 use crate::wavelet::needed;
 use wavesplat_format::Window;

@@ -14,12 +14,9 @@ use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
 use crate::file::promise::share_tolerance;
 use crate::file::{CoefficientFile, Prefetch};
-use crate::render::batches::expectation::Expectation;
-use crate::render::batches::layout::Layout;
-use crate::render::batches::overview::OverviewRequest;
-use crate::render::batches::plane_values::BlockPlanes;
-use crate::render::batches::scene::{
-    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
+use crate::render::batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest,
+    SampleErrors, Scene, Selection,
 };
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::report::LeftOut;

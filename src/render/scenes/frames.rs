@@ -6,11 +6,9 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::progress::Progress;
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
-use crate::render::batches::layout::Layout;
-use crate::render::batches::overview::OverviewRequest;
-use crate::render::batches::plane_values::{BlockPlanes, PlaneValues, Scratch};
-use crate::render::batches::scene::{
-    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
+use crate::render::batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest, PlaneValues,
+    SampleErrors, Scene, Scratch, Selection,
 };
 use crate::render::config::RenderConfig;
 use crate::source::scan::{Scan, scan_frame};

@@ -6,7 +6,7 @@ use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, is_missing};
 use crate::codec::WindowCodec;
 use crate::file::{CoefficientFile, Prefetch};
-use crate::render::batches::overview::OverviewRequest;
+use crate::render::batches::OverviewRequest;
 use crate::source::FrameWindow;
 use crate::wavelet;
 use rayon::prelude::*;

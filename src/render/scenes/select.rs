@@ -8,7 +8,7 @@
 use crate::base::grid::Grid;
 use crate::base::sample::magnitude;
 use crate::codec::WindowCodec;
-use crate::render::batches::expectation::{BlockInfluence, alike};
+use crate::render::batches::{BlockInfluence, alike};
 use crate::render::config::RenderConfig;
 use crate::render::report::LeftOut;
 use std::collections::BTreeMap;
@@ -288,11 +288,11 @@ struct LevelPart {
 
 /// The level parts of a block, finest first.
 fn levels(entry: &BlockEntry) -> Vec<LevelPart> {
-    let of = |entry: &PartEntry| match entry.kind {
+    let level = |entry: &PartEntry| match entry.kind {
         PartKind::Level(level) => Some(LevelPart { level: level.into(), entry: *entry }),
         _ => None,
     };
-    entry.parts.iter().rev().filter_map(of).collect()
+    entry.parts.iter().rev().filter_map(level).collect()
 }
 
 /// The parts of a whole entry that `kept` lacks.

@@ -18,7 +18,7 @@ pub use ours::is_ours;
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::{Annotation, Finished};
-use super::batches::scene::Scene;
+use super::batches::Scene;
 use super::config::RenderConfig;
 use super::{Picture, Pixel, Rendered};
 use crate::base::error::{Error, Note, Remedy, Result};

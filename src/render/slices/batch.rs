@@ -10,8 +10,7 @@ use super::view::{Slice, SlicedView};
 use super::{GROUP, finish};
 use crate::base::error::Result;
 use crate::base::grid::BlockGrid;
-use crate::render::batches::samples::{BlockSamples, SampleReader};
-use crate::render::batches::units::Units;
+use crate::render::batches::{BlockSamples, SampleReader, Units};
 use crate::render::report::{RenderReport, lap};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -174,7 +173,7 @@ impl<B: Blend> SlicePass<'_, B> {
                 Need::Hidden(_) => report.blocks_hidden += 1,
             }
             let fill = |units: &Units| match need {
-                Need::Fill(value) | Need::Hidden(value) => units.from_value(value),
+                Need::Fill(value) | Need::Hidden(value) => units.number(value),
                 Need::Read | Need::Missing => f32::NAN,
             };
             frames.par_iter_mut().for_each(|frame| frame.layers.fill(view, &region, fill(&frame.units)));

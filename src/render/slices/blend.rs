@@ -7,7 +7,7 @@ use super::shade::{Lit, Shader};
 use super::table::{ENTRIES, Table};
 use super::view::SlicedView;
 use crate::colour::TransferFunction;
-use crate::render::batches::units::Units;
+use crate::render::batches::Units;
 use crate::render::light::Light;
 
 /// Emission and absorption: the light of each slice passes through the slices before it.

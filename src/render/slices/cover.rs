@@ -256,9 +256,9 @@ mod tests {
     #[test]
     fn two_sheets_let_the_light_of_both_through() {
         for (covered, opacity) in [(0.3, 0.4), (0.9, 0.7), (0.6, 1.0), (1.0, 0.5)] {
-            let of = |sheets| Meeting { gradient: [0.0; 3], covered, sheets }.opacity(opacity);
-            let through = (1.0 - of(Sheets::One)) * (1.0 - of(Sheets::Second));
-            let both = 1.0 - of(Sheets::Both);
+            let opacity_of = |sheets| Meeting { gradient: [0.0; 3], covered, sheets }.opacity(opacity);
+            let through = (1.0 - opacity_of(Sheets::One)) * (1.0 - opacity_of(Sheets::Second));
+            let both = 1.0 - opacity_of(Sheets::Both);
             let expected = 1.0 - covered + covered * (1.0 - opacity) * (1.0 - opacity);
             assert!((through - expected).abs() < 1e-6 && (both - expected).abs() < 1e-6);
         }

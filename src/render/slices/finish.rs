@@ -4,7 +4,7 @@
 use super::GROUP;
 use super::row::Blend;
 use super::view::SlicedView;
-use crate::render::batches::units::Units;
+use crate::render::batches::Units;
 use rayon::prelude::*;
 
 /// Cells without anything around the lattice.

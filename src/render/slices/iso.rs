@@ -8,7 +8,7 @@ use super::cover::{CoverPoint, Rays, Slope};
 use super::row::{Blend, Point, Row};
 use super::shade::Shader;
 use super::view::SlicedView;
-use crate::render::batches::units::Units;
+use crate::render::batches::Units;
 use crate::render::light::{Light, Surface};
 
 /// Surfaces of several values.
@@ -43,7 +43,7 @@ impl Isosurfaces {
         let most = surfaces.iter().map(|surface| surface.value.abs()).fold(0.0, f64::max);
         let zero = surfaces[0].value;
         let units = Units { zero, per: if most > 0.0 { 1.0 / most } else { 1.0 } };
-        let values = surfaces.iter().map(|surface| units.from_value(surface.value)).collect();
+        let values = surfaces.iter().map(|surface| units.number(surface.value)).collect();
         Self { surfaces, values, shader, rays: Rays::new(view), units }
     }
 
@@ -144,7 +144,7 @@ impl Blend for Isosurfaces {
 
     fn step(&self, (light, last): &mut Self::Exact, point: &Point, _: f64) {
         let [at, gradient] = [point.place, point.gradient].map(|numbers| numbers.map(|n| n as f32));
-        let to = CoverPoint { at, value: self.units.from_value(point.value), gradient };
+        let to = CoverPoint { at, value: self.units.number(point.value), gradient };
         if let Some(from) = last {
             self.pass(light, from, &to);
         }

@@ -4,7 +4,7 @@
 use super::GROUP;
 use super::filter::Sixteen;
 use super::row::{Blend, Point, Row};
-use crate::render::batches::units::Units;
+use crate::render::batches::Units;
 
 /// The maximum along the ray.
 pub(in crate::render) struct Largest;

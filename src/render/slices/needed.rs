@@ -3,8 +3,7 @@
 use super::row::Blend;
 use super::view::SlicedView;
 use crate::base::grid::BlockGrid;
-use crate::render::batches::scene::Selection;
-use crate::render::batches::units::Units;
+use crate::render::batches::{Selection, Units};
 
 /// What is known about the blocks of a batch before any block is read.
 pub(super) struct Known<'a> {
@@ -61,7 +60,7 @@ impl<'a> Known<'a> {
         if !self.has_values[block] {
             return Need::Fill(0.0);
         }
-        if !blend.shows((units.from_value(wide.0), units.from_value(wide.1))) {
+        if !blend.shows((units.number(wide.0), units.number(wide.1))) {
             return Need::Fill(any);
         }
         let [columns, rows] = view.reached(&self.blocks.region(block).intersect(&view.clip));

@@ -9,7 +9,7 @@ use super::layer::Layers;
 use super::row::{Blend, Point};
 use super::taps::Taps;
 use super::view::SlicedView;
-use crate::render::batches::units::Units;
+use crate::render::batches::Units;
 use crate::render::report::Probed;
 
 /// Steps per voxel along a.

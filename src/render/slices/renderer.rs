@@ -7,14 +7,11 @@ use super::view::SlicedView;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid};
 use crate::colour::TransferFunction;
-use crate::render::batches::sampled::SampledView;
-use crate::render::batches::samples::SampleReader;
-use crate::render::batches::scene::Scene;
-use crate::render::config::{Pixel, Plane, RenderConfig};
+use crate::render::batches::{SampleReader, SampledView, Scene};
+use crate::render::config::{Pixel, Plane, RenderConfig, ViewTask};
 use crate::render::planes::{PlanesPass, PlanesView};
 use crate::render::renderer::{Output, Renderer, give};
 use crate::render::report::{RenderReport, ViewReport};
-use std::ops::Range;
 
 /// Renders views slice by slice, combined by `B`. Progress counts slices of frames.
 pub(in crate::render) struct Sliced<'a, B> {
@@ -103,14 +100,8 @@ impl<B: Blend> Renderer for Sliced<'_, B> {
         self.views.iter().map(SlicedView::slices).sum()
     }
 
-    fn render(
-        &self,
-        scene: &mut dyn Scene,
-        config: &RenderConfig,
-        mut views: Range<usize>,
-        output: &mut Output<'_, '_>,
-    ) -> Result<()> {
-        views.try_for_each(|number| self.render_view(scene, config, number, output))
+    fn render(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut Output<'_, '_>) -> Result<()> {
+        task.views.clone().try_for_each(|number| self.render_view(scene, &task.config, number, output))
     }
 }
 

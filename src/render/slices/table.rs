@@ -2,7 +2,7 @@
 //! tabulated over the values (eq 30).
 
 use crate::colour::TransferFunction;
-use crate::render::batches::units::Units;
+use crate::render::batches::Units;
 
 /// Entries of the table. An entry and its slope take 32 bytes, so that the table fits in a first-level cache.
 pub(super) const ENTRIES: usize = 512;
@@ -144,7 +144,7 @@ impl Table {
     /// The largest error of a slice's light and opacity that the table makes, found at eight values per entry.
     pub(super) fn error(&self) -> f64 {
         let off = |value: f64| {
-            let (found, exact) = (self.at(self.units.from_value(value)), self.exact(value, 1.0));
+            let (found, exact) = (self.at(self.units.number(value)), self.exact(value, 1.0));
             found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs()).fold(0.0, f64::max)
         };
         let values = (0..8 * ENTRIES).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
@@ -165,20 +165,20 @@ mod tests {
     fn a_path_of_unit_length_has_the_requested_opacity() {
         let table = Table::new(&grey().over((10.0, 20.0)).expect("a range"), 1.0);
         for (value, opacity) in [(10.0, 0.0), (12.5, 0.25), (15.0, 0.5), (19.0, 0.9), (25.0, MOST_OPAQUE), (0.0, 0.0)] {
-            let [r, .., minus] = table.at(table.units.from_value(value));
+            let [r, .., minus] = table.at(table.units.number(value));
             assert!((f64::from(-minus) - opacity).abs() < 1e-5, "{value}");
             let grey = ((value - 10.0) / 10.0).clamp(0.0, 1.0);
             assert!((f64::from(r) - grey * opacity).abs() < 1e-5, "{value}");
         }
         let half = Table::new(&grey().over((10.0, 20.0)).expect("a range"), 0.5);
-        let opacity = -half.at(half.units.from_value(17.5))[3];
+        let opacity = -half.at(half.units.number(17.5))[3];
         assert!((f64::from(opacity) - 0.5).abs() < 1e-5, "two of these have 0.75: {opacity}");
     }
 
     #[test]
     fn ranges_without_opacity_are_not_visible() {
         let table = Table::new(&grey().with_opacity(&[(0.4, 0.0), (0.5, 1.0), (0.6, 0.0)]).expect("points"), 1.0);
-        let number = |value: f64| table.units.from_value(value);
+        let number = |value: f64| table.units.number(value);
         for (lo, hi, shows) in [
             (0.0, 0.39, false),
             (0.61, 1.0, false),
@@ -199,7 +199,7 @@ mod tests {
         for points in [vec![(0.2, 0.0), (0.6, 0.3), (0.9, 0.9)], vec![(0.123, 0.0), (0.456, 1.0), (0.789, 0.0)]] {
             let table =
                 Table::new(&grey().with_opacity(&points).expect("points").over((-1.0, 4.0)).expect("a range"), 1.0);
-            let value = |share: f64| table.units.from_value(-1.0 + 5.0 * share);
+            let value = |share: f64| table.units.number(-1.0 + 5.0 * share);
             assert!(!table.shows(value(0.0), value(points[0].0)), "{points:?}");
         }
     }

@@ -2,7 +2,7 @@
 
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;
-use crate::render::batches::read::{BlockAdder, BlockReader, ReadStats};
+use crate::render::batches::{BlockAdder, BlockReader, ReadStats};
 use std::ops::Range;
 
 /// A band of rows of a view's picture.

@@ -3,8 +3,7 @@
 use super::band::{Band, BandGroup};
 use super::lattice::{CellPlane, Cells, DoubleRoom, Lattice, Placed, Rectangle, SpreadScratch};
 use crate::base::error::Result;
-use crate::render::batches::plane_values::{BlockPlanes, Scratch};
-use crate::render::batches::read::BlockAdder;
+use crate::render::batches::{BlockAdder, BlockPlanes, Scratch};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

@@ -1,7 +1,7 @@
 //! The nonzero values of a block, voxel by voxel, as the footprint backend needs them.
 
 use crate::base::error::Result;
-use crate::render::batches::plane_values::{BlockPlanes, Scratch};
+use crate::render::batches::{BlockPlanes, Scratch};
 
 /// The values of a block: for each voxel in array order, a list of (plane, value).
 #[derive(Debug)]
@@ -57,7 +57,7 @@ impl SparseTerms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::batches::plane_values::PlaneValues;
+    use crate::render::batches::PlaneValues;
 
     #[test]
     fn every_voxel_has_the_terms_of_all_planes() {

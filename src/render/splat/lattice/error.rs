@@ -31,17 +31,7 @@ use super::prefilter::{HALF, Taps};
 use super::spline::spread;
 
 /// Cells per voxel, and the degree of the splines.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Choice {
-    pub(super) fineness: usize,
-    pub(super) degree: usize,
-}
-
-impl Choice {
-    pub(super) const fn new(fineness: usize, degree: usize) -> Self {
-        Self { fineness, degree }
-    }
-}
+pub(super) type Choice = [usize; 2];
 
 /// Upper bounds for an infinite slice of voxels, as shares of its largest sum of weights.
 #[derive(Debug, Clone, Copy)]
@@ -144,8 +134,7 @@ const FAR: f64 = 8.0;
 
 impl Axis {
     /// The bounds for a Gaussian with a `conditional` and a `marginal` deviation in cells (eq 39).
-    fn new(choice: Choice, taps: &Taps, [conditional, marginal]: [f64; 2], step: usize) -> Self {
-        let Choice { fineness, degree } = choice;
+    fn new([fineness, degree]: Choice, taps: &Taps, [conditional, marginal]: [f64; 2], step: usize) -> Self {
         let mut most = Self::default();
         let mut largest = [0.0_f64; 2];
         let tables = [conditional, marginal].map(Table::new);
@@ -286,7 +275,7 @@ mod tests {
             for (fineness, degree, error) in [(2, 3, 2.3e-3), (2, 4, 8.5e-4), (2, 5, 6e-4), (3, 4, 3.5e-4)] {
                 let (_, kernel) = kernel(azimuth, elevation, fineness);
                 let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new(&weighting(&kernel), Choice::new(fineness, degree), &taps).of_a_mean();
+                let stated = SliceError::new(&weighting(&kernel), [fineness, degree], &taps).of_a_mean();
                 assert!(stated < most * error, "{fineness} {degree} at {azimuth}: {stated:e}");
             }
         }
@@ -330,7 +319,7 @@ mod tests {
             for (fineness, degree) in [(1, 5), (2, 3), (2, 4), (2, 5), (3, 4)] {
                 let (shear, kernel) = kernel(azimuth, elevation, fineness);
                 let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new(&weighting(&kernel), Choice::new(fineness, degree), &taps);
+                let stated = SliceError::new(&weighting(&kernel), [fineness, degree], &taps);
                 let mut most = [0.0_f64; 2];
                 for n in 0..81_u32 {
                     let at = |i: u32| f64::from(n / 3_u32.pow(i) % 3) / 3.0;

@@ -64,17 +64,8 @@ impl SplattedView<'_> {
     }
 }
 
-/// Roughly from the cheapest on.
-const CHOICES: [Choice; 8] = [
-    Choice::new(1, 3),
-    Choice::new(1, 4),
-    Choice::new(1, 5),
-    Choice::new(2, 3),
-    Choice::new(2, 4),
-    Choice::new(2, 5),
-    Choice::new(3, 4),
-    Choice::new(4, 5),
-];
+/// Cells per voxel and degrees of splines, roughly from the cheapest on.
+const CHOICES: [Choice; 8] = [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5], [3, 4], [4, 5]];
 /// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
 /// The largest number of cells that a square tile reaches.
@@ -118,8 +109,8 @@ impl Lattice {
 
     /// The lattice of a choice, with a kernel that is cut at `radius` standard deviations; `None` if footprints are less
     /// work, or it does not suit.
-    fn new(choice: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
-        let (Choice { fineness, degree }, sigma) = (choice, view.sigma());
+    fn new([fineness, degree]: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
+        let sigma = view.sigma();
         let SplattedView { grid, clip, blocks, camera, footprint, .. } = *view;
         let shear = Shear::new(camera, grid, fineness);
         let kernel = Kernel::new(&shear, sigma, radius)?;
@@ -140,7 +131,7 @@ impl Lattice {
     /// The error of a slice, by one of the bounds.
     fn slice_error(&self, bound: Bound) -> SliceError {
         let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
-        let choice = Choice::new(self.spreading.shear.fineness, self.spreading.degree);
+        let choice = [self.spreading.shear.fineness, self.spreading.degree];
         bound(&Weighting { kernel: &self.kernel, cut, additions: self.additions }, choice, &self.taps)
     }
 
@@ -306,7 +297,7 @@ impl Lattice {
 }
 
 /// The choice for a quick look, and the cut of its kernel in standard deviations.
-const QUICK: Choice = Choice::new(1, 3);
+const QUICK: Choice = [1, 3];
 const QUICK_RADIUS: f64 = 3.5;
 /// The share of the error that is left for the cut of the kernel.
 const CUT: f64 = 0.03;

@@ -12,7 +12,7 @@ use super::shear::Shear;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
-use crate::render::batches::plane_values::PlaneValues;
+use crate::render::batches::PlaneValues;
 use std::ops::Range;
 use std::sync::OnceLock;
 

@@ -4,7 +4,7 @@ use super::cells::Rectangle;
 use super::spline::spread;
 use super::*;
 use crate::base::grid::{Grid, Region};
-use crate::render::batches::plane_values::PlaneValues;
+use crate::render::batches::PlaneValues;
 use crate::view::camera::{Camera, View};
 use std::collections::BTreeMap;
 
