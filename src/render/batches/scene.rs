@@ -21,10 +21,10 @@ use crate::wavelet::Lane;
 
 /// A data source to render: a grid of voxels with a value in every frame, read block by block.
 ///
-/// The library has two scenes: [`CoefficientScene`](crate::render::CoefficientScene) and [`FrameScene`](crate::render::FrameScene). Another program can implement
-/// this trait for its own data with three types: the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the
-/// planes of a scene are the values of its frames, the batch returns [`Layout::of_values`] and [`Selection::of_all`],
-/// and its inverse copies.
+/// The library has two scenes: [`CoefficientScene`](crate::render::CoefficientScene) and
+/// [`FrameScene`](crate::render::FrameScene). Another program can implement this trait for its own data with three types:
+/// the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the planes of a scene are the values of its frames, the
+/// batch returns [`Layout::of_values`] and [`Selection::of_all`], and its inverse copies.
 pub trait Scene {
     /// The grid of voxels.
     fn grid(&self) -> &Grid;

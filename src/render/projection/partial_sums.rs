@@ -5,8 +5,8 @@
 //! ```
 //!
 //! I_p is the emission of the voxels of a part, W_p their weights, and A_p the weights of those that are missing. How voxels
-//! are splatted depends on the whole volume alone ([`Projection`] is made without a region), so the weight of a voxel at a pixel is the
-//! same in every division. Sums of parts differ from those of one rendering by rounding only: additions to a plane are in
+//! are splatted depends on the whole volume alone ([`Projection`] is made without a region), so the weight of a voxel at a
+//! pixel is the same in every division. Sums of parts differ from those of one rendering by rounding only: additions to a plane are in
 //! f32 within a part (`ROUNDING` in `splat/lattice/error.rs` counts them), and in f64 between parts.
 
 use super::Projection;
