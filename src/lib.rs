@@ -91,13 +91,13 @@
 //! # From a file to a pixel
 //!
 //! 1. `CoefficientFile::open` (`file/coefficient_file.rs`) reads the directory of blocks.
-//! 2. `render` (`render/mod.rs`) makes a `ViewSetup` of each view, and calls `project`; or, for modes with slices, a
-//!    `SlicedView`, and calls `composite`. Both loop over batches of frames with `for_each_batch` (`render/driver.rs`).
+//! 2. `render` (`render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each view,
+//!    `Sliced` or `Planes`. All loop over batches of frames with `for_each_batch` (`render/batches/driver.rs`).
 //! 3. `Scene::open` (`render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
 //! 4. `splat` (`render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`file/coefficient_file.rs`), decodes
 //!    it (`codec/decode.rs`) and gives the values of its planes (`render/scenes/coded.rs`).
 //! 5. The values are added to a lattice (`render/splat/lattice/spread.rs`), or to pixels (`render/splat/footprints.rs`).
-//! 6. `PixelReconstructor::tile` (`render/reconstruct.rs`) gathers the planes at pixels from the lattice
+//! 6. `PixelReconstructor::tile` (`render/projection/reconstruct.rs`) gathers the planes at pixels from the lattice
 //!    (`render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`wavelet/`), and divides by
 //!    weights.
 //! 7. `Sink::picture` (`render/sink/mod.rs`) colours and writes each picture.

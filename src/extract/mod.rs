@@ -31,7 +31,7 @@ use crate::base::memory;
 use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
 use crate::file::CoefficientFile;
-use ahead::Ahead;
+use ahead::fetch_ahead;
 
 use order::Strides;
 use rayon::prelude::*;
@@ -124,10 +124,13 @@ pub fn extract_to(
     let all = config.frames.len() * config.region.voxels() * file.sample().size();
     let mut buffers = Vec::new();
     let list = pieces.list(file, config);
-    let mut ahead = Ahead::default();
+    let (mut begun, mut fetched) = (0, 0);
     for together in list.chunks(pieces.together(file, config)) {
         progress.check()?;
-        ahead.fetch((file, config.channel), &list, together.len())?;
+        if fetched < begun + together.len() {
+            fetched = begun + fetch_ahead(file, config.channel, &list[begun..])?;
+        }
+        begun += together.len();
         buffers.resize_with(together.len(), Vec::new);
         let read = together.par_iter().zip(&mut buffers);
         let read = read.map(|(piece, bytes)| read_piece(file, config, piece, pieces.blocks, bytes));
@@ -200,8 +203,7 @@ impl Piece {
     fn divided(self, along: OutputAxis, items: usize, file: &CoefficientFile) -> Vec<Self> {
         match along {
             OutputAxis::Frames => {
-                let same_window = |a: &usize, b: &usize| file.window_of(*a) == file.window_of(*b);
-                let groups = self.frames.chunk_by(same_window).flat_map(|group| group.chunks(items));
+                let groups = file.by_window(&self.frames).flat_map(|group| group.chunks(items));
                 groups.map(|frames| Self { frames: frames.to_vec(), region: self.region }).collect()
             }
             OutputAxis::Voxels(axis, direction) => {
@@ -239,7 +241,7 @@ fn read_piece(
     let strides = config.order.strides(piece.frames.len(), &piece.region);
     out.resize(piece.frames.len() * piece.region.voxels() * file.sample().size(), 0); // blocks overwrite all of it
     let mut first = 0;
-    for frames in piece.frames.chunk_by(|a, b| file.window_of(*a) == file.window_of(*b)) {
+    for frames in file.by_window(&piece.frames) {
         let target = Target { strides, region: piece.region, first };
         read_window(file, config.channel, frames, &target, at_once, out, &mut report)?;
         first += frames.len();

@@ -14,27 +14,69 @@ use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
 /// Blocks that are fetched together to be checked.
 pub(super) const BLOCKS_TOGETHER: usize = 32;
 
-/// Windows whose leaves are fetched together.
-pub(crate) const WINDOWS_TOGETHER: usize = 256;
+/// Windows that are fetched together at most.
+const WINDOWS_TOGETHER: usize = 256;
 
-/// Parts of many blocks, to be fetched in few requests.
-#[derive(Debug, Default)]
-pub(crate) struct Gathered {
+/// Fetches parts of many blocks of a remote file before they are read, in few requests.
+#[derive(Debug)]
+pub(crate) struct Prefetch<'a> {
+    file: &'a CoefficientFile,
     parts: Vec<PartEntry>,
     pages: PageCount,
 }
 
-impl Gathered {
-    pub(crate) fn add(&mut self, parts: impl IntoIterator<Item = PartEntry>) {
-        for part in parts {
-            self.pages.add(&bytes_of(&part));
-            self.parts.push(part);
+impl<'a> Prefetch<'a> {
+    /// `None` for a local file, which needs none.
+    pub(crate) fn new(file: &'a CoefficientFile) -> Option<Self> {
+        file.is_remote().then(|| Self { file, parts: Vec::new(), pages: PageCount::default() })
+    }
+
+    /// Fetches the leaves of a channel that list blocks of a region, of the first windows. Each window is given by some of
+    /// its frames.
+    pub(crate) fn leaves<'f>(
+        &self,
+        windows: impl Iterator<Item = &'f [usize]>,
+        channel: usize,
+        region: &Region,
+    ) -> Result<()> {
+        let windows = windows.take(WINDOWS_TOGETHER).map(|frames| self.file.window_of(frames[0]));
+        self.file.fetch_leaves_of(windows, channel, region)
+    }
+
+    /// Calls `add` for each item, until there are as many parts as should be fetched together. Returns the number of these
+    /// items.
+    pub(crate) fn gather<T>(
+        &mut self,
+        items: impl IntoIterator<Item = T>,
+        mut add: impl FnMut(T, &mut Self) -> Result<()>,
+    ) -> Result<usize> {
+        let mut count = 0;
+        for item in items.into_iter().take(WINDOWS_TOGETHER) {
+            if self.is_full() {
+                break;
+            }
+            add(item, self)?;
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    /// Adds the parts of a block that the coefficients marked by `wanted` need.
+    pub(crate) fn add(&mut self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) {
+        for part in Block::parts(codec, entry, wanted) {
+            self.pages.add(&bytes_of(part));
+            self.parts.push(*part);
         }
     }
 
     /// Whether the parts fill as many pages as should be fetched together.
     pub(crate) fn is_full(&self) -> bool {
         self.pages.is_full()
+    }
+
+    /// Fetches the parts that were added.
+    pub(crate) fn finish(self) -> Result<()> {
+        self.file.fetch_parts(self.parts.iter())
     }
 }
 
@@ -43,8 +85,13 @@ fn bytes_of(part: &PartEntry) -> Range<u64> {
 }
 
 impl CoefficientFile {
+    /// Frames by windows.
+    pub(crate) fn by_window<'f>(&self, frames: &'f [usize]) -> impl Iterator<Item = &'f [usize]> {
+        frames.chunk_by(|a, b| self.window_of(*a) == self.window_of(*b))
+    }
+
     /// Whether the file is remote, so that bytes should be fetched before they are read.
-    pub(crate) fn is_remote(&self) -> bool {
+    pub(super) fn is_remote(&self) -> bool {
         self.reader.storage().is_remote()
     }
 
@@ -58,7 +105,7 @@ impl CoefficientFile {
     }
 
     /// Fetches the leaves of a channel of some windows that list blocks of a region.
-    pub(crate) fn fetch_leaves_of(
+    pub(super) fn fetch_leaves_of(
         &self,
         windows: impl Iterator<Item = u32>,
         channel: usize,
@@ -72,11 +119,6 @@ impl CoefficientFile {
         let end = if self.is_remote() { self.bytes().min(offset.saturating_add(FETCHED)) } else { u64::MAX };
         self.fetch(std::iter::once(offset..end))?;
         Ok(end)
-    }
-
-    /// Fetches parts that were gathered.
-    pub(crate) fn fetch_gathered(&self, gathered: &Gathered) -> Result<()> {
-        self.fetch_parts(gathered.parts.iter())
     }
 
     /// Fetches parts that will be read soon.

@@ -18,4 +18,4 @@ pub mod merge;
 pub mod resume;
 
 pub use coefficient_file::{CoefficientFile, setting, time_labels};
-pub(crate) use fetch::{Gathered, WINDOWS_TOGETHER};
+pub(crate) use fetch::Prefetch;

@@ -24,7 +24,7 @@ use crate::file::shard::Standing;
 use crate::file::{CoefficientFile, setting};
 use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
 use crate::render::sink::Provenance;
-use crate::render::{Limit, RenderConfig, RenderReport, SplatSource, Sums, render_sums};
+use crate::render::{Limit, PartialSums, RenderConfig, RenderReport, SplatSource, render_sums};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -308,12 +308,12 @@ impl Sum<'_> {
     }
 }
 
-/// Sums with the numbers that views and frames have in the archive.
-fn numbered<'a>(sums: Sums<'a>, views: &[usize], first: usize) -> Sums<'a> {
+/// Partial sums with the numbers that views and frames have in the archive.
+fn numbered<'a>(sums: PartialSums<'a>, views: &[usize], first: usize) -> PartialSums<'a> {
     match sums {
-        Sums::Weights { view, sums } => Sums::Weights { view: views[view], sums },
-        Sums::Picture { view, frame, planes, missing } => {
-            Sums::Picture { view: views[view], frame: frame + first, planes, missing }
+        PartialSums::Weights { view, sums } => PartialSums::Weights { view: views[view], sums },
+        PartialSums::Picture { view, frame, planes, missing } => {
+            PartialSums::Picture { view: views[view], frame: frame + first, planes, missing }
         }
     }
 }

@@ -110,11 +110,6 @@ impl Mode {
         }
     }
 
-    /// Whether planes are shown within a volume.
-    pub(super) fn has_planes(&self) -> bool {
-        matches!(self, Self::Composite { planes, .. } if !planes.is_empty())
-    }
-
     /// An error if the mode's own settings cannot be used.
     fn check(&self) -> Result<()> {
         match self {
@@ -171,6 +166,13 @@ pub struct RenderConfig {
     pub memory: usize,
 }
 
+/// Views to render.
+pub(super) struct ViewTask {
+    pub(super) views: Range<usize>,
+    /// The settings, with the frames of these views alone.
+    pub(super) config: RenderConfig,
+}
+
 /// An error that can be limited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Limit {
@@ -181,7 +183,7 @@ pub enum Limit {
     Expected,
 }
 
-// `RenderConfig::new` is in scene.rs, because the defaults depend on the scene.
+// `RenderConfig::new` is in batches/scene.rs, because the defaults depend on the scene.
 impl RenderConfig {
     /// Width and height of the pictures.
     pub(super) fn size(&self) -> [usize; 2] {
@@ -201,17 +203,18 @@ impl RenderConfig {
         if self.paired { self.frames.len().min(1) } else { self.frames.len() }
     }
 
-    /// Views that show the same frames, and settings with these frames alone.
-    pub(super) fn groups(&self) -> Vec<(Range<usize>, Self)> {
+    /// Views that show the same frames.
+    pub(super) fn tasks(&self) -> Vec<ViewTask> {
         if !self.paired {
-            return vec![(0..self.views.len(), self.clone())];
+            return vec![ViewTask { views: 0..self.views.len(), config: self.clone() }];
         }
         let mut first = 0;
-        let group = |same: &[usize]| {
+        let task = |same: &[usize]| {
             first += same.len();
-            (first - same.len()..first, Self { frames: vec![same[0]], ..self.clone() })
+            let config = Self { frames: vec![same[0]], ..self.clone() };
+            ViewTask { views: first - same.len()..first, config }
         };
-        self.frames.chunk_by(|a, b| a == b).map(group).collect()
+        self.frames.chunk_by(|a, b| a == b).map(task).collect()
     }
 
     /// The voxels of a grid to render.

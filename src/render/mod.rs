@@ -16,28 +16,21 @@
 //!
 //! ```text
 //! light             lamps and surfaces; config: the caller's settings
-//! layout            the planes of a batch; plane_values: a block's values, plane by plane
-//! splat/            a view's camera and backend; blocks into bands; bands into tiles
-//! weights           the divisors of means; expectation: the effect of block errors on the pixels of a view
-//! overview          single samples of a few frames, for a first impression
-//! scene             the source of blocks: a frame batch and the blocks selected for it
 //! report            what a rendering did: counts, times and errors
+//! batches/          frame batches of a scene: their planes, blocks and samples, and the loop over them
+//! renderer          the interface of the renderers of all modes
+//! splat/            a view's camera and backend; blocks into bands; bands into tiles
 //! scenes/           a coefficient file or an archive's frames as a scene
-//! slices/           composites, isosurfaces and maximum intensity projections: the field along rays, slice by slice
 //! planes/           planes through the volume: where rays meet them, and the samples there
-//! plan              how much fits in memory
-//! certificate       the error bound of a pixel; weigh: the weights of a view
-//! reconstruct       planes to pixels: inverse transform, division, certificate
-//! driver            the loop over frame batches; bands: rows of all pictures of a batch
-//! project           the pictures of a batch as projections; composite: slice by slice; cut: planes through the volume
+//! slices/           composites, isosurfaces and maximum intensity projections: the field along rays, slice by slice
+//! projection/       projections: weights, memory, bands of rows, planes to pixels; sums of a part of the voxels
 //! annotate/, sink/  text in pictures, and output files, with page/ for web pages; pictures: a rendering into files
-//! setups            the setups of all views, and which mode renders them
-//! sums              what a part of the voxels adds to pictures; parts/: files of such sums, and pictures of them
+//! parts/            files of the sums of parts, and pictures of them
 //! ```
 //!
 //! ```text
-//! for each group of views                      plan: as many as fit in memory
-//!   for each batch of frames of a window       driver: as many as fit; the scene selects its blocks
+//! for each group of views                      projection/plan: as many as fit in memory
+//!   for each batch of frames of a window       batches/driver: as many as fit; the scene selects its blocks
 //!     for each band of rows
 //!       for each run of blocks                 scene: read, decode                          (workers)
 //!         add it to every plane of every view  splat: values -> cells or tiles              (one owner each)
@@ -52,54 +45,62 @@
 
 mod light;
 mod config;
-mod layout;
-mod plane_values;
-mod splat;
-mod weights;
-mod expectation;
-mod overview;
-mod scene;
 mod report;
+mod batches;
+mod renderer;
+mod splat;
 mod scenes;
-mod slices;
 pub mod planes;
-mod plan;
-mod certificate;
-mod weigh;
-mod reconstruct;
-mod driver;
-mod bands;
-mod project;
-mod composite;
-mod cut;
+mod slices;
+mod projection;
 pub mod annotate;
 pub(crate) mod page;
 pub mod sink;
 mod pictures;
-mod setups;
-mod sums;
 pub mod parts;
 
 pub use crate::wavelet::{LANES, Lane};
-pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
-pub use expectation::Expectation;
-pub use layout::{Layout, Order};
-pub use light::{Light, Surface};
-pub use overview::{OverviewRequest, Thinning, stride};
-pub use pictures::render_png;
-pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
-pub use report::{Picture, Probed, RenderReport, Rendered, ViewReport};
-pub use scene::{
-    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
+pub use batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, Order,
+    OverviewRequest, PlaneValues, SampleErrors, Scene, Scratch, Selection, Thinning, stride,
 };
+pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
+pub use light::{Light, Surface};
+pub use pictures::render_png;
+pub use projection::partial_sums::{PartialSumSink, PartialSums, render_sums};
+pub use report::{LeftOut, Picture, Probed, RenderReport, Rendered, ViewReport};
 pub use scenes::{CoefficientScene, FrameScene, SplatSource};
-pub use sums::{SumSink, Sums, render_sums};
 
-use crate::base::error::Result;
+use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::progress::Progress;
-use plan::Budget;
-use setups::Setups;
+use planes::Planes;
+use projection::Projection;
+use renderer::{Output, Renderer, check_memory};
+use slices::{Composite, Isosurfaces, Largest, Sliced};
 use std::time::{Duration, Instant};
+
+/// What renders the mode of `config`.
+fn renderer<'a>(scene: &dyn Scene, config: &'a RenderConfig) -> Result<Box<dyn Renderer + 'a>> {
+    config.check(scene.frames())?;
+    if !config.mode.is_projection() && scene.channels() > 1 {
+        let what = "the samples are colours already, and colours are rendered as projections only";
+        return Err(Error::setting("mode", Note::with(what, Remedy::ProjectOrConvertSamples)));
+    }
+    let (grid, spacing) = (scene.grid(), scene.grid().largest_spacing());
+    Ok(match &config.mode {
+        Mode::Projection => Box::new(Projection::new(grid, scene.blocks(), config)?),
+        Mode::Composite { transfer, unit, light, planes, .. } => {
+            let unit = unit.unwrap_or(spacing);
+            let blend = move |view: &_| Composite::new(transfer, unit, *light, view, spacing);
+            Box::new(Sliced::new(grid, config, blend)?.with_planes(planes, transfer))
+        }
+        Mode::Iso { surfaces, light, .. } => {
+            Box::new(Sliced::new(grid, config, |view| Isosurfaces::new(surfaces, *light, view))?)
+        }
+        Mode::Mip { .. } => Box::new(Sliced::new(grid, config, |_| Largest)?),
+        Mode::Planes { planes } => Box::new(Planes::new(grid, config, planes)?),
+    })
+}
 
 /// Renders all frames from all views, or each view's own frame ([`RenderConfig::paired`]), and gives each picture to
 /// `sink`. The frames of one view come in order.
@@ -113,11 +114,10 @@ pub fn render(
     sink: &mut dyn FnMut(Rendered<'_>) -> Result<()>,
 ) -> Result<RenderReport> {
     let started = Instant::now();
-    let setups = Setups::new(scene, config)?;
-    Budget::check(config, setups.least(scene, config))?;
-    let mut report = RenderReport { frames: config.frames.len(), ..Default::default() };
-    report.views = setups.reports(config);
-    let views = report.views.clone();
+    let renderer = renderer(scene, config)?;
+    check_memory(config, renderer.least_memory(scene, config))?;
+    let views = renderer.reports(config);
+    let mut report = RenderReport { frames: config.frames.len(), views: views.clone(), ..Default::default() };
     let mut sink_time = Duration::ZERO;
     let mut sink = |rendered: Rendered<'_>| {
         let writing = Instant::now();
@@ -125,9 +125,10 @@ pub fn render(
         sink_time += writing.elapsed();
         Ok(())
     };
-    progress.start(Some(setups.steps(config)));
-    for (views, config) in config.groups() {
-        setups.render((scene, &config), views, progress, &mut report, &mut sink)?;
+    progress.start(Some((renderer.steps() * config.frames_of_view()) as u64));
+    for task in config.tasks() {
+        let mut output = Output { sink: &mut sink, report: &mut report, progress };
+        renderer.render(scene, &task, &mut output)?;
     }
     progress.finish();
     report.sum_up_expected_errors(config.frames_of_view());
@@ -140,7 +141,7 @@ pub fn render(
 /// # Errors
 /// The errors that [`render`] would return before its first picture.
 pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
-    least_memory(scene, config).and_then(|least| Budget::check(config, least))
+    least_memory(scene, config).and_then(|least| check_memory(config, least))
 }
 
 /// The least memory in bytes with which [`render`] renders these views, without the memory of the sink.
@@ -148,5 +149,5 @@ pub fn check(scene: &dyn Scene, config: &RenderConfig) -> Result<()> {
 /// # Errors
 /// The errors that [`check`] returns, but for too little memory.
 pub fn least_memory(scene: &dyn Scene, config: &RenderConfig) -> Result<usize> {
-    Ok(Setups::new(scene, config)?.least(scene, config))
+    Ok(renderer(scene, config)?.least_memory(scene, config))
 }

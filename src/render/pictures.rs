@@ -1,8 +1,8 @@
 //! A rendering with picture files as its output.
 
+use super::batches::Scene;
 use super::config::RenderConfig;
 use super::report::RenderReport;
-use super::scene::Scene;
 use super::sink::{Sink, SinkConfig};
 use crate::base::error::Result;
 use crate::base::output::names_of_views;

@@ -1,7 +1,5 @@
 //! Reports of a rendering: its pictures, counts and times.
 
-use super::scene::{LeftOut, Selection};
-use super::splat::{SplatStats, ViewSetup};
 use crate::view::camera::{Camera, View};
 use serde::Serialize;
 use std::time::Instant;
@@ -77,6 +75,28 @@ pub struct RenderReport {
     pub seconds: f64,
 }
 
+/// Counts of blocks and parts that are not read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// Blocks that are skipped entirely.
+    pub blocks: u64,
+    /// Parts that are not read, including the parts of skipped blocks.
+    pub parts: u64,
+    /// Nonzero coefficients in these parts.
+    pub coefficients: u64,
+    /// Stored bytes of these parts.
+    pub bytes: u64,
+}
+
+impl std::ops::AddAssign for LeftOut {
+    fn add_assign(&mut self, other: Self) {
+        self.blocks += other.blocks;
+        self.parts += other.parts;
+        self.coefficients += other.coefficients;
+        self.bytes += other.bytes;
+    }
+}
+
 /// The errors of some pixels of a view's first frame, against the field of the samples sampled finely along their rays.
 /// They are an estimate of the errors of all pixels, without those of the samples.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -122,24 +142,6 @@ pub struct ViewReport {
 }
 
 impl RenderReport {
-    /// Adds the blocks of a batch.
-    pub(super) fn add_selection(&mut self, blocks: usize, selection: &Selection) {
-        self.blocks += blocks as u64;
-        self.blocks_empty += selection.empty;
-        self.left_out += selection.left_out;
-        self.other_frames += selection.other_frames;
-        self.certified_sample_error = self.certified_sample_error.max(selection.certified);
-    }
-
-    /// Adds the counts and times of splatting.
-    pub(super) fn add_splatted(&mut self, stats: &SplatStats) {
-        self.blocks_read += stats.blocks;
-        self.coefficients += stats.coefficients;
-        self.bytes_read += stats.bytes;
-        self.decode_seconds += stats.decode.as_secs_f64();
-        self.splat_seconds += stats.splat.as_secs_f64();
-    }
-
     /// Turns the sums over the frames of each view into root mean squares, and combines these into one for all views.
     pub(super) fn sum_up_expected_errors(&mut self, frames: usize) {
         let (frames, views) = (frames.max(1) as f64, self.views.len() as f64);
@@ -150,26 +152,8 @@ impl RenderReport {
 }
 
 impl ViewReport {
-    /// The report of a projection before anything is splatted.
-    pub(super) fn new(view: &View, setup: &ViewSetup) -> Self {
-        let (method, stated_splat_error) = (setup.method.name, setup.stated_error);
-        Self { method, stated_splat_error, ..Self::of(view, &setup.camera) }
-    }
-
-    /// The report of a composite or of largest values.
-    pub(super) fn of_slices(view: &View, camera: &Camera, slices: usize, cells: usize) -> Self {
-        let (slices, cells, none) = (Some(slices), Some(cells), f64::NAN);
-        let of_camera = Self::of(view, camera);
-        Self { method: "slices", slices, cells, stated_splat_error: none, expected_error: none, ..of_camera }
-    }
-
-    /// The report of planes through the volume.
-    pub(super) fn of_planes(view: &View, camera: &Camera) -> Self {
-        let none = f64::NAN;
-        Self { method: "planes", stated_splat_error: none, expected_error: none, ..Self::of(view, camera) }
-    }
-
-    fn of(view: &View, camera: &Camera) -> Self {
+    /// The report of a view before anything is rendered.
+    pub(super) fn new(view: &View, camera: &Camera) -> Self {
         let &View { azimuth, elevation, roll, .. } = view;
         Self { azimuth, elevation, roll, scale: camera.scale, center: camera.beside(0.0), ..Self::default() }
     }

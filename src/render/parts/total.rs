@@ -8,13 +8,13 @@ use crate::base::grid::Region;
 use crate::base::progress::Progress;
 use crate::base::time_labels::TimeLabels;
 use crate::render::config::RenderConfig;
-use crate::render::reconstruct::finished;
+use crate::render::projection::Projection;
+use crate::render::projection::partial_sums::PartialSums;
+use crate::render::projection::reconstruct::finished;
+use crate::render::projection::weight_sums::WeightSums;
+use crate::render::renderer::Renderer;
 use crate::render::report::{RenderReport, Rendered};
-use crate::render::setups::{reports_of_splatted, splatted};
 use crate::render::splat::ViewSetup;
-use crate::render::sums::Sums;
-use crate::render::weigh::weights_of_parts;
-use crate::render::weights::Weights;
 use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -179,12 +179,12 @@ impl Total {
     ) -> Result<RenderReport> {
         let (started, config) = (Instant::now(), self.config(frames, self.memory)?);
         self.check_memory()?;
-        let setups = splatted((self.look().grid, self.look().blocks()), &config)?;
-        let reports = reports_of_splatted(&setups, &config);
+        let projection = Projection::new(&self.look().grid, self.look().blocks(), &config)?;
+        let reports = projection.reports(&config);
         let steps = config.shown().len();
         progress.start(Some(steps as u64));
-        for (n, (view, setup)) in self.views(frames).into_iter().zip(&setups).enumerate() {
-            let mut weights: Option<(Vec<usize>, Weights)> = None;
+        for (n, (view, setup)) in self.views(frames).into_iter().zip(&projection.setups).enumerate() {
+            let mut weights: Option<(Vec<usize>, WeightSums<'_>)> = None;
             for (frame, holders) in self.of_view(view, frames) {
                 progress.check()?;
                 let parts: Vec<usize> = holders.iter().map(|(part, _)| *part).collect();
@@ -221,12 +221,12 @@ impl Total {
         progress.start(Some(all.iter().map(|(_, pictures)| pictures.len() as u64).sum()));
         for (view, pictures) in all {
             let parts = pictures.iter().take(1).flat_map(|(_, holders)| holders.iter().map(|(part, _)| *part));
-            writer.put(Sums::Weights { view, sums: &self.weight_sums(view, &parts.collect::<Vec<_>>())? })?;
+            writer.put(PartialSums::Weights { view, sums: &self.weight_sums(view, &parts.collect::<Vec<_>>())? })?;
             for (frame, holders) in pictures {
                 progress.check()?;
                 let (planes, missing) = self.sums(holders)?;
                 let planes: Vec<&[f64]> = planes.iter().map(Vec::as_slice).collect();
-                writer.put(Sums::Picture { view, frame, planes: &planes, missing })?;
+                writer.put(PartialSums::Picture { view, frame, planes: &planes, missing })?;
                 progress.advance(1);
             }
         }
@@ -259,10 +259,15 @@ impl Total {
     }
 
     /// The weights of a view, with its background.
-    fn weights(&self, setup: &ViewSetup, config: &RenderConfig, (view, parts): (usize, &[usize])) -> Result<Weights> {
+    fn weights<'a>(
+        &self,
+        setup: &'a ViewSetup,
+        config: &RenderConfig,
+        (view, parts): (usize, &[usize]),
+    ) -> Result<WeightSums<'a>> {
         let whole = [setup.clip];
         let boxes = if self.is_whole() { &whole[..] } else { &self.boxes };
-        weights_of_parts(setup, config, (self.weight_sums(view, parts)?, boxes))
+        WeightSums::new(setup, self.weight_sums(view, parts)?, None).with_background(config, boxes)
     }
 
     fn check_memory(&self) -> Result<()> {
@@ -325,9 +330,9 @@ impl Total {
 }
 
 /// A picture of sums.
-fn picture(config: &RenderConfig, weights: &Weights, (planes, missing): (&[Vec<f64>], bool)) -> Vec<f32> {
+fn picture(config: &RenderConfig, weights: &WeightSums<'_>, (planes, missing): (&[Vec<f64>], bool)) -> Vec<f32> {
     let channels = planes.chunks(1 + usize::from(missing));
-    let finish = |of: &[Vec<f64>]| finished(config.quantity, weights, (&of[0], of.get(1).map(Vec::as_slice)));
+    let finish = |of: &[Vec<f64>]| finished(config.quantity, weights, &of[0], of.get(1).map(Vec::as_slice));
     let channels: Vec<Vec<f32>> = channels.map(finish).collect();
     match <[Vec<f32>; 1]>::try_from(channels) {
         Ok([only]) => only,

@@ -4,7 +4,7 @@ use super::MAGIC;
 use super::look::{Head, Look, PictureRecord, Place, SCHEMA, Source, WeightRecord};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
-use crate::render::sums::Sums;
+use crate::render::PartialSums;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
@@ -42,13 +42,13 @@ impl<W: Write> PartWriter<W> {
     ///
     /// # Errors
     /// Failed writes.
-    pub fn put(&mut self, sums: Sums<'_>) -> Result<()> {
+    pub fn put(&mut self, sums: PartialSums<'_>) -> Result<()> {
         match sums {
-            Sums::Weights { view, sums } => {
+            PartialSums::Weights { view, sums } => {
                 let place = self.record(&[sums])?;
                 self.head.weights.push(WeightRecord { view, place });
             }
-            Sums::Picture { view, frame, planes, missing } => {
+            PartialSums::Picture { view, frame, planes, missing } => {
                 let place = self.record(planes)?;
                 self.head.pictures.push(PictureRecord { view, frame, missing, place });
             }

@@ -46,12 +46,12 @@ impl PlanesView {
         let (start, along) = self.camera.ray(point);
         let start: [f64; 3] = std::array::from_fn(|a| (start[a] - self.grid.origin[a]) / self.grid.spacing[a]);
         let along: [f64; 3] = std::array::from_fn(|a| along[a] / self.grid.spacing[a]);
-        let hits = self.planes.iter().enumerate().filter_map(|(n, plane)| self.hit((n, plane), start, along));
+        let hits = self.planes.iter().enumerate().filter_map(|(number, plane)| self.hit(number, plane, start, along));
         hits.reduce(|nearest, other| if other.depth < nearest.depth { other } else { nearest })
     }
 
     /// Where a ray, given in voxels, meets a plane.
-    fn hit(&self, (number, plane): (usize, &Plane), start: [f64; 3], along: [f64; 3]) -> Option<Hit> {
+    fn hit(&self, number: usize, plane: &Plane, start: [f64; 3], along: [f64; 3]) -> Option<Hit> {
         let depth = (plane.at - start[plane.axis]) / along[plane.axis];
         if !depth.is_finite() {
             return None;

@@ -7,12 +7,14 @@
 //! ```text
 //! hits    pure geometry: the nearest plane of a ray; the voxels around a place, and their weights
 //! view    the planes of a view, block by block
-//! batch   the pictures of a batch of frames
+//! batch   the pictures of a batch of frames; renderer: of all frames
 //! ```
 
 mod hits;
 mod view;
 mod batch;
+mod renderer;
 
-pub(super) use batch::Cut;
+pub(super) use batch::PlanesPass;
 pub use hits::{Hit, PlanesView, Taps};
+pub(super) use renderer::Planes;

@@ -3,9 +3,8 @@
 use crate::base::error::Result;
 use crate::codec::WindowCodec;
 use crate::file::CoefficientFile;
+use crate::render::batches::{BatchRequest, Layout, Order};
 use crate::render::config::RenderConfig;
-use crate::render::layout::{Layout, Order};
-use crate::render::scene::BatchRequest;
 use crate::wavelet::needed;
 use wavesplat_format::Window;
 
@@ -43,7 +42,7 @@ impl BatchPlan {
         window: u32,
         request: &BatchRequest<'_>,
     ) -> Result<Self> {
-        let BatchRequest { channel, config, .. } = *request;
+        let config = request.config;
         let first = file.window_range(window).start;
         let frames: Vec<usize> = request.frames.iter().map(|f| f - first).collect();
         let codec = file.codec(window)?;
@@ -51,8 +50,8 @@ impl BatchPlan {
         let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
         let few = few_asked(file, &codec, window, config);
         let by_values = what != SplatSource::Samples && !config.certify && (few || !config.mode.is_projection());
-        let counts = (kept.len(), frames.len());
-        let layout = layout(file, &codec, (window, channel), (what, by_values), counts, config);
+        let values = what == SplatSource::Samples || by_values;
+        let layout = layout(file, &codec, window, request, values, kept.len());
         Ok(Self { what, codec, frames, wanted, kept, by_values, few, layout })
     }
 }
@@ -73,24 +72,25 @@ fn is_dense(window: &Window, series: usize) -> bool {
     window.pyramid.is_some() || 2 * window.coded > series as u64 * u64::from(window.coefficients)
 }
 
-/// The layout of a batch of `frames` frames that needs `kept` coefficients.
+/// The layout of a batch that needs `kept` coefficients, or if `values` the values of each frame instead.
 fn layout(
     file: &CoefficientFile,
     codec: &WindowCodec,
-    (window, channel): (u32, usize),
-    (what, by_values): (SplatSource, bool),
-    (kept, frames): (usize, usize),
-    config: &RenderConfig,
+    window: u32,
+    request: &BatchRequest<'_>,
+    values: bool,
+    kept: usize,
 ) -> Layout {
+    let BatchRequest { frames, channel, config, .. } = *request;
     let leaves = file.leaves_of(window, channel);
     let coded = leaves.iter().any(|leaf| leaf.coded > 0);
     let exact = leaves.iter().any(|leaf| leaf.exact > 0);
     let record = &file.metadata().windows[window as usize];
-    let (values, missing) = (what == SplatSource::Samples || by_values, file.has_missing(window));
+    let missing = file.has_missing(window);
     let is_dense = is_dense(record, file.channels() * file.grid.whole().voxels());
     Layout {
         coefficients: if values || !coded { 0 } else { kept },
-        frames,
+        frames: frames.len(),
         values: values || exact || record.outliers > 0 || missing,
         absent: missing,
         error_planes: error_planes(config, codec.parts()),

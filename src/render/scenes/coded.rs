@@ -6,7 +6,7 @@ use crate::codec::WindowCodec;
 use crate::codec::buffer::Buffer;
 use crate::codec::decode::Block;
 use crate::codec::field::Field;
-use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
+use crate::render::batches::{BlockPlanes, PlaneValues, Scratch};
 
 /// A decoded block of a file.
 pub(super) struct CodedBlock<'a> {

@@ -13,15 +13,13 @@ use crate::base::progress::Progress;
 use crate::base::sample::{magnitude, rounding};
 use crate::codec::decode::Block;
 use crate::file::promise::share_tolerance;
-use crate::file::{CoefficientFile, Gathered, WINDOWS_TOGETHER};
-use crate::render::config::{Limit, RenderConfig};
-use crate::render::expectation::Expectation;
-use crate::render::layout::Layout;
-use crate::render::overview::OverviewRequest;
-use crate::render::plane_values::BlockPlanes;
-use crate::render::scene::{
-    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, LeftOut, SampleErrors, Scene, Selection,
+use crate::file::{CoefficientFile, Prefetch};
+use crate::render::batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest,
+    SampleErrors, Scene, Selection,
 };
+use crate::render::config::{Limit, RenderConfig};
+use crate::render::report::LeftOut;
 use crate::wavelet::Lane;
 use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind};
@@ -45,30 +43,25 @@ impl CoefficientScene {
     /// Fetches the bytes of a remote file that the next frames of a request need: all of the first window, and as many
     /// later windows as fit.
     fn fetch_ahead(&mut self, request: &BatchRequest<'_>) -> Result<()> {
-        let (file, channel, config) = (&self.file, request.channel, request.config);
-        if !file.is_remote() || request.frames[0] < self.fetched[channel] {
+        let (channel, config) = (request.channel, request.config);
+        let Some(mut prefetch) = Prefetch::new(&self.file) else { return Ok(()) };
+        if request.frames[0] < self.fetched[channel] {
             return Ok(());
         }
         let later = &config.frames[config.frames.partition_point(|frame| *frame < request.frames[0])..];
-        let windows = later.chunk_by(|a, b| file.window_of(*a) == file.window_of(*b)).take(WINDOWS_TOGETHER);
-        let region = config.region.unwrap_or(file.grid.whole());
-        file.fetch_leaves_of(windows.clone().map(|frames| file.window_of(frames[0])), channel, &region)?;
-        if !config.mode.is_projection() {
-            // Which blocks are hidden is known later.
-            let last = windows.last().map_or(0, |frames| frames[frames.len() - 1]);
-            self.fetched[channel] = last + 1;
-            return Ok(());
-        }
-        let mut gathered = Gathered::default();
-        for frames in windows {
-            let batch = CoefficientBatch::open(file, self.what, &BatchRequest { frames, ..*request })?;
-            batch.gather(&batch.selection.blocks, &mut gathered)?;
-            self.fetched[channel] = frames[frames.len() - 1] + 1;
-            if gathered.is_full() {
-                break;
+        let region = config.region.unwrap_or(self.file.grid.whole());
+        prefetch.leaves(self.file.by_window(later), channel, &region)?;
+        let fetched = &mut self.fetched[channel];
+        prefetch.gather(self.file.by_window(later), |frames, prefetch| {
+            // In other modes, which blocks are hidden is known later.
+            if config.mode.is_projection() {
+                let batch = CoefficientBatch::open(&self.file, self.what, &BatchRequest { frames, ..*request })?;
+                batch.gather(&batch.selection.blocks, prefetch)?;
             }
-        }
-        self.file.fetch_gathered(&gathered)
+            *fetched = frames[frames.len() - 1] + 1;
+            Ok(())
+        })?;
+        if config.mode.is_projection() { prefetch.finish() } else { Ok(()) }
     }
 }
 
@@ -116,7 +109,7 @@ impl Scene for CoefficientScene {
     }
 
     fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
-        overview::of_file(&self.file, request, progress).map(Some)
+        overview::overview(&self.file, request, progress).map(Some)
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
@@ -294,13 +287,13 @@ impl<'a> CoefficientBatch<'a> {
     }
 
     /// Gathers the parts to read of some blocks, in order, until there are as many as should be fetched together.
-    fn gather(&self, blocks: &[usize], gathered: &mut Gathered) -> Result<()> {
+    fn gather(&self, blocks: &[usize], prefetch: &mut Prefetch<'_>) -> Result<()> {
         let BatchPlan { codec, wanted, .. } = &self.plan;
         for block in blocks {
-            if gathered.is_full() {
+            if prefetch.is_full() {
                 break;
             }
-            gathered.add(Block::parts(codec, &self.kept(*block)?.entry, wanted).copied());
+            prefetch.add(codec, &self.kept(*block)?.entry, wanted);
         }
         Ok(())
     }
@@ -322,12 +315,9 @@ impl FrameBatch for CoefficientBatch<'_> {
     }
 
     fn fetch(&self, blocks: &[usize]) -> Result<()> {
-        if !self.file.is_remote() {
-            return Ok(());
-        }
-        let mut gathered = Gathered::default();
-        self.gather(blocks, &mut gathered)?;
-        self.file.fetch_gathered(&gathered)
+        let Some(mut prefetch) = Prefetch::new(self.file) else { return Ok(()) };
+        self.gather(blocks, &mut prefetch)?;
+        prefetch.finish()
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

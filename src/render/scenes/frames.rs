@@ -6,13 +6,11 @@ use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::progress::Progress;
 use crate::base::sample::{self, is_missing, magnitude};
 use crate::colour::TransferFunction;
-use crate::render::config::RenderConfig;
-use crate::render::layout::Layout;
-use crate::render::overview::OverviewRequest;
-use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
-use crate::render::scene::{
-    BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection,
+use crate::render::batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest, PlaneValues,
+    SampleErrors, Scene, Scratch, Selection,
 };
+use crate::render::config::RenderConfig;
 use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, CHANNELS, ColourTransform, ColourWindow, FrameSource, FrameWindow};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};

@@ -5,21 +5,20 @@ use crate::base::grid::Region;
 use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, is_missing};
 use crate::codec::WindowCodec;
-use crate::codec::decode::Block;
-use crate::file::{CoefficientFile, Gathered, WINDOWS_TOGETHER};
-use crate::render::overview::OverviewRequest;
+use crate::file::{CoefficientFile, Prefetch};
+use crate::render::batches::OverviewRequest;
 use crate::source::FrameWindow;
 use crate::wavelet;
 use rayon::prelude::*;
 use wavesplat_format::BlockEntry;
 
 /// An overview of a file, decoded from the coarse parts of its blocks where it has pyramids.
-pub(super) fn of_file(
+pub(super) fn overview(
     file: &CoefficientFile,
     request: &OverviewRequest<'_>,
     progress: &dyn Progress,
 ) -> Result<Vec<f32>> {
-    let windows: Vec<_> = request.frames.chunk_by(|a, b| file.window_of(*a) == file.window_of(*b)).collect();
+    let windows: Vec<_> = file.by_window(request.frames).collect();
     let blocks = file.blocks.touching(&request.region).count();
     progress.start(Some((file.channels() * windows.len() * blocks) as u64));
     let mut samples = vec![f32::NAN; file.channels() * request.samples()];
@@ -29,7 +28,7 @@ pub(super) fn of_file(
     for channel in 0..file.channels() {
         for frames in &windows {
             let (of_window, later) = rest.split_at_mut(frames.len() * of_frame);
-            of_window_and_channel(file, (request, frames, channel), of_window, progress)?;
+            decode_window(file, request, frames, channel, of_window, progress)?;
             rest = later;
         }
     }
@@ -40,25 +39,19 @@ pub(super) fn of_file(
 
 /// Fetches the parts that the overview needs from a remote file, as many as should be fetched together.
 fn fetch(file: &CoefficientFile, request: &OverviewRequest<'_>, windows: &[&[usize]]) -> Result<()> {
-    if !file.is_remote() {
-        return Ok(());
-    }
-    let mut gathered = Gathered::default();
+    let Some(mut prefetch) = Prefetch::new(file) else { return Ok(()) };
     for channel in 0..file.channels() {
-        let windows = &windows[..windows.len().min(WINDOWS_TOGETHER)];
-        file.fetch_leaves_of(windows.iter().map(|frames| file.window_of(frames[0])), channel, &request.region)?;
-        for frames in windows {
-            if gathered.is_full() {
-                break;
-            }
+        prefetch.leaves(windows.iter().copied(), channel, &request.region)?;
+        prefetch.gather(windows, |frames, prefetch| {
             let (window, codec, frames) = coarse(file, request, frames)?;
             let wanted = wavelet::needed(&codec.synthesis, &frames);
             for entries in file.entries(window, channel, &request.region) {
-                gathered.add(entries?.iter().flat_map(|entry| Block::parts(&codec, entry, &wanted)).copied());
+                entries?.iter().for_each(|entry| prefetch.add(&codec, entry, &wanted));
             }
-        }
+            Ok(())
+        })?;
     }
-    file.fetch_gathered(&gathered)
+    prefetch.finish()
 }
 
 /// The window of some frames, the codec for their overview, and their numbers in the window.
@@ -73,9 +66,11 @@ fn coarse(
 }
 
 /// The overview of some frames of one window, in one channel.
-fn of_window_and_channel(
+fn decode_window(
     file: &CoefficientFile,
-    (request, frames, channel): (&OverviewRequest<'_>, &[usize], usize),
+    request: &OverviewRequest<'_>,
+    frames: &[usize],
+    channel: usize,
     samples: &mut [f32],
     progress: &dyn Progress,
 ) -> Result<()> {
@@ -129,7 +124,7 @@ impl Frames<'_> {
         planes.try_for_each(|(plane, z)| {
             let mut rows = plane.chunks_exact_mut(nx).zip(&ys).filter(|(_, y)| is_needed(1, **y));
             rows.try_for_each(|(row, y)| {
-                let all = self.row(frame, (*y, z), request.thinning.blocks.dims[0])?;
+                let all = self.row(frame, [*y, z], request.thinning.blocks.dims[0])?;
                 row.iter_mut().zip(&xs).for_each(|(out, x)| *out = all[*x]);
                 Ok(())
             })
@@ -137,7 +132,7 @@ impl Frames<'_> {
     }
 
     /// A row of `voxels` voxels along x; NaN where one is missing.
-    fn row(&self, frame: usize, (y, z): (usize, usize), voxels: usize) -> Result<Vec<f32>> {
+    fn row(&self, frame: usize, [y, z]: [usize; 2], voxels: usize) -> Result<Vec<f32>> {
         let row = Region { start: [0, y, z], end: [voxels, y + 1, z + 1] };
         let (mut bytes, mut values) = (vec![0; voxels * self.sample.size()], vec![0.0; voxels]);
         self.window.read_box(frame, &row, &mut bytes)?;

@@ -8,9 +8,9 @@
 use crate::base::grid::Grid;
 use crate::base::sample::magnitude;
 use crate::codec::WindowCodec;
+use crate::render::batches::{BlockInfluence, alike};
 use crate::render::config::RenderConfig;
-use crate::render::expectation::{BlockInfluence, alike};
-use crate::render::scene::LeftOut;
+use crate::render::report::LeftOut;
 use std::collections::BTreeMap;
 use wavesplat_format::{BlockEntry, PartEntry, PartKind};
 
@@ -175,7 +175,7 @@ impl BlockSelector {
         let all = levels(block.entry).iter().fold(Alternative::default(), |w, part| self.with(w, part, block));
         let exact = block.entry.part(PartKind::Exact).is_some();
         kept.expected = if exact {
-            finite(as_zero * as_zero * block.influence.of(f64::INFINITY))
+            finite(as_zero * as_zero * block.influence.for_alike(f64::INFINITY))
         } else {
             kept.expected + all.change
         };
@@ -226,7 +226,7 @@ impl BlockSelector {
     }
 
     fn in_pixels(&self, energy: f64, alike: f64, block: &BlockView<'_>) -> f64 {
-        finite(energy / (self.frames * block.voxels) as f64 * block.influence.of(alike))
+        finite(energy / (self.frames * block.voxels) as f64 * block.influence.for_alike(alike))
     }
 
     /// The steps of leaving out a block's parts, by ascending price per byte; none for a block that influences no
@@ -288,11 +288,11 @@ struct LevelPart {
 
 /// The level parts of a block, finest first.
 fn levels(entry: &BlockEntry) -> Vec<LevelPart> {
-    let of = |entry: &PartEntry| match entry.kind {
+    let level = |entry: &PartEntry| match entry.kind {
         PartKind::Level(level) => Some(LevelPart { level: level.into(), entry: *entry }),
         _ => None,
     };
-    entry.parts.iter().rev().filter_map(of).collect()
+    entry.parts.iter().rev().filter_map(level).collect()
 }
 
 /// The parts of a whole entry that `kept` lacks.

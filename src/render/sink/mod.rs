@@ -18,8 +18,8 @@ pub(crate) use page_encoder::{BlockOfFrames, PageEncoder};
 pub use provenance::{Provenance, Shows};
 
 use super::annotate::{Annotation, Finished};
+use super::batches::Scene;
 use super::config::RenderConfig;
-use super::scene::Scene;
 use super::{Picture, Pixel, Rendered};
 use crate::base::choice::Choice;
 use crate::base::error::{Error, Note, Remedy, Result};

@@ -5,32 +5,25 @@ use super::needed::{Known, Need};
 use super::probe::Probe;
 use super::row::Blend;
 use super::stops::Stops;
-use super::sweep::{Band, Work};
-use super::units::Units;
-use super::values::samples;
+use super::sweep::{Band, SweepScratch};
 use super::view::{Slice, SlicedView};
 use super::{GROUP, finish};
 use crate::base::error::Result;
-use crate::base::grid::{BlockGrid, Region};
+use crate::base::grid::BlockGrid;
+use crate::render::batches::{BlockSamples, SampleReader, Units};
 use crate::render::report::{RenderReport, lap};
-use crate::render::scene::FrameBatch;
 use rayon::prelude::*;
 use std::time::Instant;
 
 /// A batch of frames, seen from one view.
-pub(in crate::render) struct Batch<'a, B: Blend> {
+pub(in crate::render) struct SlicePass<'a, B: Blend> {
     /// The number of the view.
     pub(in crate::render) number: usize,
     pub(in crate::render) view: &'a SlicedView,
     pub(in crate::render) blend: &'a B,
     /// Where rays end early, if any does.
     pub(in crate::render) stops: Option<&'a Stops>,
-    pub(in crate::render) blocks: BlockGrid,
-    pub(in crate::render) batch: &'a dyn FrameBatch,
-    /// Blocks to decode at a time.
-    pub(in crate::render) together: usize,
-    /// Called with numbers of finished slices of all frames.
-    pub(in crate::render) advance: &'a (dyn Fn(usize) + Sync),
+    pub(in crate::render) reader: &'a SampleReader<'a>,
 }
 
 /// A frame in work.
@@ -68,7 +61,7 @@ pub(in crate::render) fn bytes<B: Blend>(
     let layers = Layers::bytes(view, most_layers(view, blocks));
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
-    let sweep = rayon::current_num_threads() * Work::bytes(view, rows_of_band(view), is_shaded);
+    let sweep = rayon::current_num_threads() * SweepScratch::bytes(view, rows_of_band(view), is_shaded);
     frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLICES * Slice::bytes(view)
 }
 
@@ -78,11 +71,12 @@ fn rows_of_band(view: &SlicedView) -> usize {
     view.extent[1].div_ceil(bands)
 }
 
-impl<B: Blend> Batch<'_, B> {
+impl<B: Blend> SlicePass<'_, B> {
     /// The pictures of all frames, one after another.
-    pub(in crate::render) fn render(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
-        let known = Known::new(self.view, self.blocks, self.batch.selection());
-        let (units, most) = (self.units(&known)?, most_layers(self.view, self.blocks));
+    pub(in crate::render) fn pictures(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
+        let SampleReader { batch, blocks, progress, .. } = *self.reader;
+        let known = Known::new(self.view, blocks, batch.selection());
+        let (units, most) = (self.units(&known)?, most_layers(self.view, blocks));
         let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
         let mut probe = (report.views[self.number].probed.is_none() && self.stops.is_none())
             .then(|| Probe::new(self.view, self.blend));
@@ -91,7 +85,7 @@ impl<B: Blend> Batch<'_, B> {
             let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
             let mut clock = Instant::now();
             frames.iter_mut().for_each(|frame| frame.layers.advance(self.view.first_needed(next), met));
-            self.read(&known, layer, (&units, &mut frames), report)?;
+            self.read(&known, layer, &mut frames, report)?;
             lap(&mut clock, &mut report.decode_seconds);
             let ready = self.view.ready(next, met);
             next = ready.end;
@@ -104,9 +98,9 @@ impl<B: Blend> Batch<'_, B> {
                 probe.add(self.blend, &frame.units, &frame.layers, met);
             }
             lap(&mut clock, &mut report.splat_seconds);
-            (self.advance)(ready.len() * units.len());
+            progress.advance((ready.len() * units.len()) as u64);
         }
-        (self.advance)((self.view.slices() - next) * units.len());
+        progress.advance(((self.view.slices() - next) * units.len()) as u64);
         let mut clock = Instant::now();
         let pictures = self.finish(&frames);
         report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
@@ -117,7 +111,7 @@ impl<B: Blend> Batch<'_, B> {
     /// The first and the last voxel along a of each layer of blocks, in the order in which rays meet them.
     fn layers(&self) -> Vec<[usize; 2]> {
         let (axis, clip) = (self.view.shear.axes[2], &self.view.clip);
-        let edge = self.blocks.edges[axis];
+        let edge = self.reader.blocks.edges[axis];
         if self.view.extent.contains(&0) {
             return Vec::new();
         }
@@ -128,8 +122,8 @@ impl<B: Blend> Batch<'_, B> {
     }
 
     /// The units of each frame.
-    fn units(&self, known: &Known) -> Result<Vec<Units>> {
-        let frames = self.batch.layout().frames;
+    fn units(&self, known: &Known<'_>) -> Result<Vec<Units>> {
+        let frames = self.reader.batch.layout().frames;
         match known.middle() {
             Some(middle) => Ok(vec![self.blend.units(middle); frames]),
             None if B::CENTRED => self.middles(frames),
@@ -140,10 +134,8 @@ impl<B: Blend> Batch<'_, B> {
     /// Units around the middle of the first block of each frame that has any sample.
     fn middles(&self, frames: usize) -> Result<Vec<Units>> {
         let mut middles = vec![None; frames];
-        for block in &self.batch.selection().blocks {
-            self.batch.fetch(&[*block])?;
-            let planes = self.batch.planes(*block)?;
-            let all = samples(self.batch, planes.as_ref(), &vec![Units { zero: 0.0, per: 1.0 / 16.0 }; frames])?;
+        for block in &self.reader.batch.selection().blocks {
+            let all = self.reader.read_one(*block, &vec![Units { zero: 0.0, per: 1.0 / 16.0 }; frames])?;
             for (middle, samples) in middles.iter_mut().zip(all).filter(|(middle, _)| middle.is_none()) {
                 let present = || samples.iter().copied().filter(|sample| !sample.is_nan());
                 let ends = [present().fold(f32::INFINITY, f32::min), present().fold(f32::NEG_INFINITY, f32::max)];
@@ -159,20 +151,21 @@ impl<B: Blend> Batch<'_, B> {
     /// Reads the blocks of a layer that are needed, and fills the others with one value.
     fn read(
         &self,
-        known: &Known,
+        known: &Known<'_>,
         [first, last]: [usize; 2],
-        (units, frames): (&[Units], &mut [Frame<B>]),
+        frames: &mut [Frame<B>],
         report: &mut RenderReport,
     ) -> Result<()> {
-        let (view, axis) = (self.view, self.view.shear.axes[2]);
+        let (view, axis, blocks) = (self.view, self.view.shear.axes[2], self.reader.blocks);
+        let units: Vec<Units> = frames.iter().map(|frame| frame.units).collect();
         let mut region = view.clip;
         (region.start[axis], region.end[axis]) = (first, last + 1);
         let limits: Vec<&[f32]> = frames.iter().map(|frame| frame.limits.as_slice()).collect();
-        let need = |block: usize| (block, known.need((view, self.blend, &units[0]), &limits, block));
-        let needs: Vec<(usize, Need)> = self.blocks.touching(&region).map(need).collect();
+        let need = |block: usize| (block, known.need(self.blend, &units[0], &limits, block));
+        let needs: Vec<(usize, Need)> = blocks.touching(&region).map(need).collect();
         let (read, others): (Vec<_>, Vec<_>) = needs.into_iter().partition(|(_, need)| *need == Need::Read);
         for (block, need) in others {
-            let region = self.blocks.region(block);
+            let region = blocks.region(block);
             match need {
                 Need::Read => {}
                 Need::Missing => report.blocks_transparent += 1,
@@ -180,31 +173,20 @@ impl<B: Blend> Batch<'_, B> {
                 Need::Hidden(_) => report.blocks_hidden += 1,
             }
             let fill = |units: &Units| match need {
-                Need::Fill(value) | Need::Hidden(value) => units.of(value),
+                Need::Fill(value) | Need::Hidden(value) => units.number(value),
                 Need::Read | Need::Missing => f32::NAN,
             };
             frames.par_iter_mut().for_each(|frame| frame.layers.fill(view, &region, fill(&frame.units)));
         }
         let read: Vec<usize> = read.into_iter().map(|(block, _)| block).collect();
-        self.batch.fetch(&read)?;
-        for blocks in read.chunks(self.together.max(1)) {
-            self.batch.fetch(blocks)?;
-            let all = blocks.par_iter().map(|block| self.decode(*block, units)).collect::<Result<Vec<_>>>()?;
+        let stats = self.reader.read(&read, &units, |read: &[BlockSamples]| {
             frames.par_iter_mut().enumerate().for_each(|(n, frame)| {
-                all.iter().for_each(|(region, samples, _)| frame.layers.put(view, region, &samples[n]));
+                read.iter().for_each(|(region, samples)| frame.layers.put(view, region, &samples[n]));
             });
-            report.blocks_read += all.len() as u64;
-            report.coefficients += all.iter().map(|(.., held)| held[0]).sum::<u64>();
-            report.bytes_read += all.iter().map(|(.., held)| held[1]).sum::<u64>();
-        }
+        })?;
+        report.count_read(&stats);
         frames.par_iter_mut().for_each(|frame| frame.layers.seal(view.count[0]));
         Ok(())
-    }
-
-    /// The samples of a block in each frame; and what it held, for the report.
-    fn decode(&self, block: usize, units: &[Units]) -> Result<(Region, Vec<Vec<f32>>, [u64; 2])> {
-        let planes = self.batch.planes(block)?;
-        Ok((self.blocks.region(block), samples(self.batch, planes.as_ref(), units)?, planes.held()))
     }
 
     /// Adds slices to all cells of a frame, in bands of rows.
@@ -213,11 +195,11 @@ impl<B: Blend> Batch<'_, B> {
         let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
         let chunks = frame.groups.par_chunks_mut(rows * of_row).zip(frame.limits.par_chunks_mut(rows * of_row));
         chunks.enumerate().for_each(|(n, (groups, limits))| {
-            let (work, rows) =
-                (Work::new(view, rows, self.blend.is_shaded()), n * rows..((n + 1) * rows).min(view.extent[1]));
+            let scratch = SweepScratch::new(view, rows, self.blend.is_shaded());
+            let rows = n * rows..((n + 1) * rows).min(view.extent[1]);
             let first = n * rows_of_band(view) * of_row;
-            let stops = self.stops.map_or(&[][..], |stops| stops.of(first..first + groups.len()));
-            let mut band = Band { view, blend: self.blend, rows, groups, limits, stops, work };
+            let stops = self.stops.map_or(&[][..], |stops| stops.groups(first..first + groups.len()));
+            let mut band = Band { view, blend: self.blend, rows, groups, limits, stops, scratch };
             slices.iter().for_each(|slice| band.add(slice, &frame.layers));
         });
     }

@@ -5,13 +5,31 @@ use super::filter::Sixteen;
 use super::row::{Blend, Point, Row};
 use super::shade::{Lit, Shader};
 use super::table::{ENTRIES, Table};
-use super::units::Units;
+use super::view::SlicedView;
+use crate::colour::TransferFunction;
+use crate::render::batches::Units;
+use crate::render::light::Light;
 
 /// Emission and absorption: the light of each slice passes through the slices before it.
 pub(in crate::render) struct Composite {
-    pub(in crate::render) table: Table,
+    table: Table,
     /// The light on the colours, if they are shaded.
-    pub(in crate::render) shader: Option<Shader>,
+    shader: Option<Shader>,
+}
+
+impl Composite {
+    /// For a view of voxels at most `spacing` apart. A path of the length `unit` has the opacity of the transfer function.
+    pub(in crate::render) fn new(
+        transfer: &TransferFunction,
+        unit: f64,
+        light: Option<Light>,
+        view: &SlicedView,
+        spacing: f64,
+    ) -> Self {
+        let table = Table::new(transfer, view.step / unit);
+        let shader = light.map(|light| Shader::new(light, view, table.faint(spacing)));
+        Self { table, shader }
+    }
 }
 
 /// Rays with less transmittance are opaque: the rest is a thirtieth of a level of an 8-bit picture.
@@ -39,8 +57,12 @@ impl Blend for Composite {
         self.shader.is_some()
     }
 
+    fn table_error(&self) -> Option<f64> {
+        Some(self.table.error())
+    }
+
     fn shows(&self, range: (f32, f32)) -> bool {
-        self.table.shows(range)
+        self.table.shows(range.0, range.1)
     }
 
     fn hides(limit: f32, _: (f32, f32)) -> bool {
@@ -123,7 +145,7 @@ fn add(row: &Row<'_>, entries: &[[f32; 8]; ENTRIES], groups: &mut [[[f32; 4]; GR
             add_whole(&row.sums(n), entries, group)
         } else {
             let (means, lengths) = row.means(n);
-            add_part((&means, &lengths), entries, group, *limit)
+            add_part(&means, &lengths, entries, group, *limit)
         };
     }
 }
@@ -147,7 +169,7 @@ fn add_shaded(
         if any {
             let lit = shader.shade(&row.gradient(n, (!is_whole).then_some(&means)));
             let shares = if is_whole { [1.0; GROUP] } else { shares(&opacities, &lengths) };
-            *limit = put_lit_behind(group, &lights, (&opacities, &lit), &shares);
+            *limit = put_lit_behind(group, &lights, &opacities, &lit, &shares);
         }
     }
 }
@@ -181,7 +203,8 @@ fn look_up(means: &Sixteen, entries: &[[f32; 8]; ENTRIES]) -> Looked {
 fn put_lit_behind(
     group: &mut [[f32; 4]; GROUP],
     lights: &[[f32; 4]; GROUP],
-    (opacities, lit): (&Sixteen, &Lit),
+    opacities: &Sixteen,
+    lit: &Lit,
     shares: &Sixteen,
 ) -> f32 {
     /// Which of the four numbers are colours.
@@ -248,7 +271,8 @@ fn add_whole(means: &Sixteen, entries: &[[f32; 8]; ENTRIES], group: &mut [[f32; 
 /// The same for a slice with shorter rays. `before` is the limit.
 #[inline(always)]
 fn add_part(
-    (means, lengths): (&Sixteen, &Sixteen),
+    means: &Sixteen,
+    lengths: &Sixteen,
     entries: &[[f32; 8]; ENTRIES],
     group: &mut [[f32; 4]; GROUP],
     before: f32,

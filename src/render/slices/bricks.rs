@@ -71,8 +71,8 @@ impl Ranges {
         wide
     }
 
-    /// The range of some columns of some rows.
-    pub(super) fn of(&self, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>) -> (f32, f32) {
+    /// The joint range of some columns of some rows.
+    pub(super) fn joined(&self, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>) -> (f32, f32) {
         let mut range = (f32::INFINITY, f32::NEG_INFINITY);
         for row in rows {
             for at in row * self.columns + columns.start..row * self.columns + columns.end {
@@ -102,7 +102,7 @@ mod tests {
             assert_eq!(found.largest[brick], values().fold(f32::NEG_INFINITY, f32::max));
         }
         let wide = found.dilated(1);
-        assert_eq!(wide.of(0..1, 0..2), found.of(0..2, 0..2));
+        assert_eq!(wide.joined(0..1, 0..2), found.joined(0..2, 0..2));
         assert!(!ranges(&vec![1.0; stride * rows], (stride, columns)).1);
     }
 }

@@ -15,7 +15,7 @@ use super::view::SlicedView;
 
 /// The field at a point of a ray.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::render) struct Place {
+pub(in crate::render) struct CoverPoint {
     /// Voxels along b, c and a, from the first ones; those along a are counted along the ray.
     pub(super) at: [f32; 3],
     pub(super) value: f32,
@@ -35,8 +35,8 @@ impl Slope {
     pub(super) const NOTHING: Self = Self { values: [f32::NAN; GROUP], gradient: [[0.0; GROUP]; 3] };
 
     /// The field at a cell whose place is `at`.
-    pub(super) fn place(&self, i: usize, at: [f32; 3]) -> Place {
-        Place { at, value: self.values[i], gradient: self.gradient.map(|along| along[i]) }
+    pub(super) fn point(&self, i: usize, at: [f32; 3]) -> CoverPoint {
+        CoverPoint { at, value: self.values[i], gradient: self.gradient.map(|along| along[i]) }
     }
 }
 
@@ -105,7 +105,7 @@ impl Rays {
     }
 
     /// Where a ray meets the surface of a value between two points, if it does.
-    pub(super) fn meeting(&self, value: f32, from: &Place, to: &Place) -> Option<Meeting> {
+    pub(super) fn meeting(&self, value: f32, from: &CoverPoint, to: &CoverPoint) -> Option<Meeting> {
         let rises = [from, to].map(|place| self.rise(&place.gradient));
         let bend = (rises[1] - rises[0]) / (to.at[2] - from.at[2]);
         let share = rises[0] / (rises[0] - rises[1]);
@@ -144,7 +144,7 @@ impl Rays {
     }
 
     /// The share of a cell of a surface within the box. `bend` is the change of the rise along the ray.
-    pub(super) fn within(&self, place: &Place, bend: f32) -> f32 {
+    pub(super) fn within(&self, place: &CoverPoint, bend: f32) -> f32 {
         let distance = |axis: usize| (place.at[axis] + 0.5).min(self.count[axis] - 0.5 - place.at[axis]);
         let near = |axis: &usize| distance(*axis) < FAR;
         let shares = (0..3).filter(near).map(|axis| self.of_face(axis, distance(axis), place, bend));
@@ -152,7 +152,7 @@ impl Rays {
     }
 
     /// The share of a cell on this side of a face across an axis.
-    fn of_face(&self, axis: usize, distance: f32, place: &Place, bend: f32) -> f32 {
+    fn of_face(&self, axis: usize, distance: f32, place: &CoverPoint, bend: f32) -> f32 {
         let ([b, c, _], rise) = (place.gradient, self.rise(&place.gradient));
         // From cell to cell, the point on the surface moves along the ray by -(b, c) / rise.
         let moved = match axis {
@@ -167,9 +167,9 @@ impl Rays {
 }
 
 /// The field between two points, by linear interpolation.
-fn between(from: &Place, to: &Place, share: f32) -> Place {
+fn between(from: &CoverPoint, to: &CoverPoint, share: f32) -> CoverPoint {
     let mix = |a: f32, b: f32| a + share * (b - a);
-    Place {
+    CoverPoint {
         at: std::array::from_fn(|i| mix(from.at[i], to.at[i])),
         value: mix(from.value, to.value),
         gradient: std::array::from_fn(|i| mix(from.gradient[i], to.gradient[i])),
@@ -177,7 +177,7 @@ fn between(from: &Place, to: &Place, share: f32) -> Place {
 }
 
 /// The value at a share of the way, by the cubic that has the values and the rises of both ends.
-fn turning_value(from: &Place, to: &Place, rises: [f32; 2], share: f32) -> f32 {
+fn turning_value(from: &CoverPoint, to: &CoverPoint, rises: [f32; 2], share: f32) -> f32 {
     let (rest, length) = (1.0 - share, to.at[2] - from.at[2]);
     let ends = rest * rest * (1.0 + 2.0 * share) * from.value + share * share * (3.0 - 2.0 * share) * to.value;
     ends + length * share * rest * (rest * rises[0] - share * rises[1])
@@ -243,7 +243,7 @@ mod tests {
             let marks = rays.near(&values, &from, &to);
             for (i, mark) in marks.into_iter().enumerate() {
                 let [first, last] = [[9.0; 3], [9.0, 9.0, 9.0 + between]];
-                let met = |value: &f32| rays.meeting(*value, &from.place(i, first), &to.place(i, last)).is_some();
+                let met = |value: &f32| rays.meeting(*value, &from.point(i, first), &to.point(i, last)).is_some();
                 let any = values.iter().any(met);
                 assert!(mark || !any, "{n} {i}");
                 shown += u32::from(any);
@@ -256,9 +256,9 @@ mod tests {
     #[test]
     fn two_sheets_let_the_light_of_both_through() {
         for (covered, opacity) in [(0.3, 0.4), (0.9, 0.7), (0.6, 1.0), (1.0, 0.5)] {
-            let of = |sheets| Meeting { gradient: [0.0; 3], covered, sheets }.opacity(opacity);
-            let through = (1.0 - of(Sheets::One)) * (1.0 - of(Sheets::Second));
-            let both = 1.0 - of(Sheets::Both);
+            let opacity_of = |sheets| Meeting { gradient: [0.0; 3], covered, sheets }.opacity(opacity);
+            let through = (1.0 - opacity_of(Sheets::One)) * (1.0 - opacity_of(Sheets::Second));
+            let both = 1.0 - opacity_of(Sheets::Both);
             let expected = 1.0 - covered + covered * (1.0 - opacity) * (1.0 - opacity);
             assert!((through - expected).abs() < 1e-6 && (both - expected).abs() < 1e-6);
         }

@@ -12,6 +12,24 @@ pub(super) struct Strip {
     pub(super) stride: usize,
 }
 
+/// The sums of one slice along some axes: of values, and of the weights of present samples.
+#[derive(Debug, Default)]
+pub(super) struct AxisSums {
+    pub(super) values: Vec<f32>,
+    pub(super) present: Vec<f32>,
+}
+
+impl AxisSums {
+    pub(super) fn zeros(count: usize) -> Self {
+        Self { values: vec![0.0; count], present: Vec::new() }
+    }
+
+    /// Makes room for the weights of present samples.
+    pub(super) fn with_present(&mut self) {
+        self.present.resize(self.values.len(), 0.0);
+    }
+}
+
 /// Stores the weighted sums of a strip of several layers. Layers may be one array from several first numbers on, so
 /// this filters along any axis.
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
@@ -28,9 +46,11 @@ pub(super) fn mix(layers: &[&[f32]], weights: &[f32], from: Strip, rows: usize, 
 pub(super) fn mix_present(
     layers: &[&[f32]],
     weights: &[f32],
-    (from, mask): (Strip, &Sixteen),
+    from: Strip,
+    mask: &Sixteen,
     rows: usize,
-    (to, out, present): (Strip, &mut [f32], &mut [f32]),
+    to: Strip,
+    sums: &mut AxisSums,
 ) {
     for row in 0..rows {
         let (mut sum, mut weight_sum) = ([0.0; GROUP], [0.0; GROUP]);
@@ -42,8 +62,8 @@ pub(super) fn mix_present(
                 weight_sum[i] += if missing { 0.0 } else { weight * mask[i] };
             }
         }
-        put(out, to.at + row * to.stride, &sum);
-        put(present, to.at + row * to.stride, &weight_sum);
+        put(&mut sums.values, to.at + row * to.stride, &sum);
+        put(&mut sums.present, to.at + row * to.stride, &weight_sum);
     }
 }
 

@@ -3,8 +3,8 @@
 
 use super::GROUP;
 use super::row::Blend;
-use super::units::Units;
 use super::view::SlicedView;
+use crate::render::batches::Units;
 use rayon::prelude::*;
 
 /// Cells without anything around the lattice.

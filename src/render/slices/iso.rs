@@ -4,12 +4,12 @@
 
 use super::GROUP;
 use super::blend::{off_light, pixel_of_light};
-use super::cover::{Place, Rays, Slope};
+use super::cover::{CoverPoint, Rays, Slope};
 use super::row::{Blend, Point, Row};
 use super::shade::Shader;
-use super::units::Units;
 use super::view::SlicedView;
-use crate::render::light::Surface;
+use crate::render::batches::Units;
+use crate::render::light::{Light, Surface};
 
 /// Surfaces of several values.
 pub(in crate::render) struct Isosurfaces {
@@ -36,18 +36,19 @@ pub(in crate::render) struct Front {
 const CLOSED: f32 = 1.0 / 8192.0;
 
 impl Isosurfaces {
-    pub(in crate::render) fn new(surfaces: &[Surface], view: &SlicedView, shader: Shader) -> Self {
+    pub(in crate::render) fn new(surfaces: &[Surface], light: Light, view: &SlicedView) -> Self {
+        let shader = Shader::new(light, view, 0.0);
         let mut surfaces = surfaces.to_vec();
         surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
         let most = surfaces.iter().map(|surface| surface.value.abs()).fold(0.0, f64::max);
         let zero = surfaces[0].value;
         let units = Units { zero, per: if most > 0.0 { 1.0 / most } else { 1.0 } };
-        let values = surfaces.iter().map(|surface| units.of(surface.value)).collect();
+        let values = surfaces.iter().map(|surface| units.number(surface.value)).collect();
         Self { surfaces, values, shader, rays: Rays::new(view), units }
     }
 
     /// Adds the surfaces between two points of a ray behind those in front of them.
-    fn pass(&self, light: &mut [f32; 4], from: &Place, to: &Place) {
+    fn pass(&self, light: &mut [f32; 4], from: &CoverPoint, to: &CoverPoint) {
         if from.value.is_nan() || to.value.is_nan() {
             return;
         }
@@ -92,8 +93,8 @@ impl Blend for Isosurfaces {
         true
     }
 
-    fn shows(&self, (lo, hi): (f32, f32)) -> bool {
-        self.values.iter().any(|value| lo <= *value && *value <= hi)
+    fn shows(&self, range: (f32, f32)) -> bool {
+        self.values.iter().any(|value| range.0 <= *value && *value <= range.1)
     }
 
     fn hides(limit: f32, _: (f32, f32)) -> bool {
@@ -114,7 +115,7 @@ impl Blend for Isosurfaces {
                     let [b, c, a] = row.place;
                     let at = [b + (n * GROUP + i) as f32, c, a];
                     let before = std::array::from_fn(|axis| at[axis] - self.rays.between * self.rays.direction[axis]);
-                    self.pass(&mut group.light[i], &group.last.place(i, before), &next.place(i, at));
+                    self.pass(&mut group.light[i], &group.last.point(i, before), &next.point(i, at));
                 }
                 *limit = group.light.iter().map(|cell| cell[3]).fold(0.0, f32::max);
             }
@@ -135,7 +136,7 @@ impl Blend for Isosurfaces {
     }
 
     /// The light, and the last point.
-    type Exact = ([f32; 4], Option<Place>);
+    type Exact = ([f32; 4], Option<CoverPoint>);
 
     fn exact(&self) -> Self::Exact {
         (Self::NOTHING, None)
@@ -143,7 +144,7 @@ impl Blend for Isosurfaces {
 
     fn step(&self, (light, last): &mut Self::Exact, point: &Point, _: f64) {
         let [at, gradient] = [point.place, point.gradient].map(|numbers| numbers.map(|n| n as f32));
-        let to = Place { at, value: self.units.of(point.value), gradient };
+        let to = CoverPoint { at, value: self.units.number(point.value), gradient };
         if let Some(from) = last {
             self.pass(light, from, &to);
         }

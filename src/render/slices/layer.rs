@@ -1,6 +1,6 @@
 //! The voxels of one frame around the slices in work: a few layers across the principal axis.
 //!
-//! Samples are in the units of the table or of the largest value ([`super::units::Units`]). NaN is missing. Rows run along b and are
+//! Samples are in the units of the table or of the largest value ([`crate::render::batches::Units`]). NaN is missing. Rows run along b and are
 //! padded with zeros to whole bricks.
 
 use super::bricks::{self, Ranges};

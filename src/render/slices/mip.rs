@@ -4,7 +4,7 @@
 use super::GROUP;
 use super::filter::Sixteen;
 use super::row::{Blend, Point, Row};
-use super::units::Units;
+use crate::render::batches::Units;
 
 /// The maximum along the ray.
 pub(in crate::render) struct Largest;
@@ -43,12 +43,12 @@ impl Blend for Largest {
         Units { zero: middle, per: 1.0 / 16.0 }
     }
 
-    fn shows(&self, (lo, hi): (f32, f32)) -> bool {
-        lo <= hi
+    fn shows(&self, range: (f32, f32)) -> bool {
+        range.0 <= range.1
     }
 
-    fn hides(limit: f32, (_, hi): (f32, f32)) -> bool {
-        hi <= limit
+    fn hides(limit: f32, range: (f32, f32)) -> bool {
+        range.1 <= limit
     }
 
     fn is_closed(_: f32) -> bool {

@@ -25,7 +25,7 @@
 //! once for each frame. The data go this way:
 //!
 //! ```text
-//! blocks, a layer at a time       values: samples in table units   needed: blocks that may be visible
+//! blocks, a layer at a time       samples in table units           needed: blocks that may be visible
 //!   voxel layers of a frame       layer, bricks                    front to back, a few at a time
 //!     slice: sums along a         filter                           6 layers with the default kernel
 //!       phases: sums along b      filter                           whole rows
@@ -37,31 +37,33 @@
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.
 
-pub(super) mod units;
-pub(super) mod table;
+mod table;
 mod taps;
-pub(super) mod view;
-pub(super) mod stops;
-mod bricks;
-pub(super) mod layer;
+mod view;
 mod filter;
-pub(super) mod row;
-pub(super) mod shade;
-pub(super) mod blend;
-pub(super) mod iso;
+mod stops;
+mod bricks;
+mod layer;
+mod row;
+mod shade;
+mod blend;
 mod cover;
-pub(super) mod mip;
+mod iso;
+mod mip;
 mod sweep;
 mod finish;
 mod probe;
-pub(super) mod values;
 mod needed;
-pub(super) mod batch;
+mod batch;
+mod renderer;
 
 #[cfg(test)]
 mod tests;
 
-pub(super) use view::SlicedView;
+pub(super) use blend::Composite;
+pub(super) use iso::Isosurfaces;
+pub(super) use mip::Largest;
+pub(super) use renderer::Sliced;
 
 /// Cells that are computed together; also the voxels along b of a brick.
 const GROUP: usize = 16;

@@ -1,13 +1,13 @@
 //! The blocks that a batch must read: those near which a value may be visible.
 
 use super::row::Blend;
-use super::units::Units;
 use super::view::SlicedView;
 use crate::base::grid::BlockGrid;
-use crate::render::scene::Selection;
+use crate::render::batches::{Selection, Units};
 
 /// What is known about the blocks of a batch before any block is read.
-pub(super) struct Known {
+pub(super) struct Known<'a> {
+    view: &'a SlicedView,
     blocks: BlockGrid,
     /// A range that holds the samples of each block; inverted if all are missing.
     ranges: Vec<(f64, f64)>,
@@ -31,8 +31,8 @@ pub(super) enum Need {
 
 const INVERTED: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
-impl Known {
-    pub(super) fn new(view: &SlicedView, blocks: BlockGrid, selection: &Selection) -> Self {
+impl<'a> Known<'a> {
+    pub(super) fn new(view: &'a SlicedView, blocks: BlockGrid, selection: &Selection) -> Self {
         let (mut ranges, mut has_values) = (vec![INVERTED; blocks.len()], vec![false; blocks.len()]);
         selection.ranges.iter().for_each(|(block, range)| ranges[*block] = *range);
         selection.blocks.iter().for_each(|block| has_values[*block] = true);
@@ -40,7 +40,7 @@ impl Known {
         for (i, axis) in view.shear.axes.into_iter().enumerate() {
             widen(&mut wide, blocks, axis, (2 * (view.reach[i] + view.margin) - 1).div_ceil(blocks.edges[axis]));
         }
-        Self { blocks, ranges, wide, has_values }
+        Self { view, blocks, ranges, wide, has_values }
     }
 
     /// The middle of all values, if it is known.
@@ -51,13 +51,8 @@ impl Known {
     }
 
     /// What to do with a block. `limits` are those of all frames.
-    pub(super) fn need<B: Blend>(
-        &self,
-        (view, blend, units): (&SlicedView, &B, &Units),
-        limits: &[&[f32]],
-        block: usize,
-    ) -> Need {
-        let (own, wide) = (self.ranges[block], self.wide[block]);
+    pub(super) fn need<B: Blend>(&self, blend: &B, units: &Units, limits: &[&[f32]], block: usize) -> Need {
+        let (view, own, wide) = (self.view, self.ranges[block], self.wide[block]);
         if own.0 > own.1 {
             return Need::Missing;
         }
@@ -65,7 +60,7 @@ impl Known {
         if !self.has_values[block] {
             return Need::Fill(0.0);
         }
-        if !blend.shows((units.of(wide.0), units.of(wide.1))) {
+        if !blend.shows((units.number(wide.0), units.number(wide.1))) {
             return Need::Fill(any);
         }
         let [columns, rows] = view.reached(&self.blocks.region(block).intersect(&view.clip));

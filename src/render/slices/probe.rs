@@ -8,8 +8,8 @@ use super::LEAST;
 use super::layer::Layers;
 use super::row::{Blend, Point};
 use super::taps::Taps;
-use super::units::Units;
 use super::view::SlicedView;
+use crate::render::batches::Units;
 use crate::render::report::Probed;
 
 /// Steps per voxel along a.

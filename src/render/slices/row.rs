@@ -1,8 +1,8 @@
 //! A row of cells in a slice: means and lengths, sixteen cells at a time, and the ways to combine the slices.
 
 use super::filter::{Sixteen, weighted_rows};
-use super::units::Units;
 use super::{GROUP, stops};
+use crate::render::batches::Units;
 
 /// Sums along a and b of a row of cells, from the first row of voxels on that the weights along c meet.
 #[derive(Clone, Copy)]
@@ -103,14 +103,14 @@ impl Row<'_> {
     #[inline(always)]
     pub(super) fn gradient(&self, group: usize, means: Option<&Sixteen>) -> [Sixteen; 3] {
         let Some([along_b, along_a]) = self.slopes else { return [[0.0; GROUP]; 3] };
-        let of = [(along_b, self.weights), (self.sums, self.weight_slopes), (along_a, self.weights)];
+        let terms = [(along_b, self.weights), (self.sums, self.weight_slopes), (along_a, self.weights)];
         let mut gradient = [[0.0; GROUP]; 3];
         // Loops instead of closures, which would not be compiled for the vector units.
-        for (component, (sums, weights)) in gradient.iter_mut().zip(of) {
+        for (component, (sums, weights)) in gradient.iter_mut().zip(terms) {
             *component = self.along_c(sums.values, weights, group);
         }
         if let Some(means) = means {
-            let (present, slopes) = (self.presence(group), self.presence_slopes(of, group));
+            let (present, slopes) = (self.presence(group), self.presence_slopes(terms, group));
             for (component, slopes) in gradient.iter_mut().zip(&slopes) {
                 for i in 0..GROUP {
                     component[i] = (component[i] - means[i] * slopes[i]) / present[i].max(f32::MIN_POSITIVE);
@@ -187,6 +187,11 @@ pub(in crate::render) trait Blend: Sync {
     /// Whether the gradient of the field is needed.
     fn is_shaded(&self) -> bool {
         false
+    }
+
+    /// The largest error of tabulated colours in the light of a slice, if there is a table.
+    fn table_error(&self) -> Option<f64> {
+        None
     }
 
     /// Whether any value in this range is visible.

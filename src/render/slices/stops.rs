@@ -30,7 +30,7 @@ impl Stops {
     }
 
     /// The stops of some groups.
-    pub(super) fn of(&self, groups: std::ops::Range<usize>) -> &[Sixteen] {
+    pub(super) fn groups(&self, groups: std::ops::Range<usize>) -> &[Sixteen] {
         &self.groups[groups]
     }
 

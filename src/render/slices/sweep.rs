@@ -1,7 +1,7 @@
 //! Adds slices to a band of the lattice: the kernel along a, then along b and c for each phase, then a blend.
 
 use super::bricks::Ranges;
-use super::filter::{Sixteen, Strip, mix, mix_present};
+use super::filter::{AxisSums, Sixteen, Strip, mix, mix_present};
 use super::layer::Layers;
 use super::row::{Blend, Row, RowSums};
 use super::stops::are_over;
@@ -21,44 +21,26 @@ pub(super) struct Band<'a, B: Blend> {
     pub(super) limits: &'a mut [f32],
     /// The stops of these groups; none if no ray ends early.
     pub(super) stops: &'a [Sixteen],
-    pub(super) work: Work,
-}
-
-/// The sums of one slice along some axes: of values, and of the weights of present samples.
-#[derive(Debug, Default)]
-struct Sums {
-    values: Vec<f32>,
-    present: Vec<f32>,
-}
-
-impl Sums {
-    fn of(count: usize) -> Self {
-        Self { values: vec![0.0; count], present: Vec::new() }
-    }
-
-    /// Makes room for the weights of present samples.
-    fn with_present(&mut self) {
-        self.present.resize(self.values.len(), 0.0);
-    }
+    pub(super) scratch: SweepScratch,
 }
 
 /// The sums of the slice in work. The derivatives are those that the gradient needs, if the blend is shaded.
-pub(super) struct Work {
+pub(super) struct SweepScratch {
     /// Zeros before and behind each row of sums along a.
     rim: usize,
-    /// Sums along a, and their derivatives along a.
-    along_a: Vec<Sums>,
-    /// Sums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
-    along_b: Vec<Vec<Sums>>,
+    /// AxisSums along a, and their derivatives along a.
+    along_a: Vec<AxisSums>,
+    /// AxisSums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
+    along_b: Vec<Vec<AxisSums>>,
 }
 
-impl Work {
+impl SweepScratch {
     /// For a band of `rows` rows.
     pub(super) fn new(view: &SlicedView, rows: usize, is_shaded: bool) -> Self {
         let (rim, rows) = (2 * view.reach[0] + GROUP, Self::rows(view, rows));
         let [of_a, of_b] = Self::kinds(is_shaded);
-        let along_a = (0..of_a).map(|_| Sums::of(rows * Self::width(view, rim))).collect();
-        let phase = |_| (0..of_b).map(|_| Sums::of(rows * view.extent[0])).collect();
+        let along_a = (0..of_a).map(|_| AxisSums::zeros(rows * Self::width(view, rim))).collect();
+        let phase = |_| (0..of_b).map(|_| AxisSums::zeros(rows * view.extent[0])).collect();
         Self { rim, along_a, along_b: (0..view.cells).map(phase).collect() }
     }
 
@@ -95,7 +77,7 @@ struct Part<'a> {
     share: f32,
     share_slope: f32,
     has_missing: bool,
-    /// The rows of bricks that the band needs. Sums begin with the first of them.
+    /// The rows of bricks that the band needs. AxisSums begin with the first of them.
     bricks: Range<usize>,
     /// The ranges of bricks, and of bricks with the rows of bricks that the kernel reaches.
     ranges: Ranges,
@@ -113,7 +95,7 @@ impl<B: Blend> Band<'_, B> {
     /// Adds a slice behind the earlier ones.
     pub(super) fn add(&mut self, slice: &Slice, layers: &Layers) {
         let part = self.part(slice, layers);
-        if self.blend.shows(part.ranges.of(part.bricks.clone(), 0..part.ranges.columns)) {
+        if self.blend.shows(part.ranges.joined(part.bricks.clone(), 0..part.ranges.columns)) {
             self.along_a(&part, layers);
             (0..self.view.cells).for_each(|phase| self.along_b(&part, phase));
             self.along_c(&part);
@@ -146,28 +128,27 @@ impl<B: Blend> Band<'_, B> {
         }
     }
 
-    /// Sums along a, for all bricks that a visible cell may need.
+    /// AxisSums along a, for all bricks that a visible cell may need.
     fn along_a(&mut self, part: &Part<'_>, layers: &Layers) {
-        let (view, rim) = (self.view, self.work.rim);
-        let (columns, stride) = (part.ranges.columns, Work::width(view, rim));
+        let (view, rim) = (self.view, self.scratch.rim);
+        let (columns, stride) = (part.ranges.columns, SweepScratch::width(view, rim));
         let reach = (GROUP + 2 * view.reach[0]) / GROUP + 1;
         if part.has_missing {
-            self.work.along_a.iter_mut().for_each(Sums::with_present);
+            self.scratch.along_a.iter_mut().for_each(AxisSums::with_present);
         }
         for row in part.bricks.clone() {
             for column in 0..columns {
                 let near = column.saturating_sub(reach)..(column + reach + 1).min(columns);
-                if !self.blend.shows(part.wide.of(row..row + 1, near)) {
+                if !self.blend.shows(part.wide.joined(row..row + 1, near)) {
                     continue;
                 }
                 let (first, rows) = rows_of(row, layers.rows);
                 let from = Strip { at: first * layers.stride + column * GROUP, stride: layers.stride };
                 let to = Strip { at: (first - part.start()) * stride + rim + column * GROUP, stride };
-                for (sums, weights) in self.work.along_a.iter_mut().zip([part.weights, part.slopes]) {
+                for (sums, weights) in self.scratch.along_a.iter_mut().zip([part.weights, part.slopes]) {
                     if part.has_missing {
                         let mask = std::array::from_fn(|i| f32::from(u8::from(column * GROUP + i < view.count[0])));
-                        let out = (to, sums.values.as_mut_slice(), sums.present.as_mut_slice());
-                        mix_present(&part.layers, weights, (from, &mask), rows, out);
+                        mix_present(&part.layers, weights, from, &mask, rows, to, sums);
                     } else {
                         mix(&part.layers, weights, from, rows, (to, &mut sums.values));
                     }
@@ -176,25 +157,25 @@ impl<B: Blend> Band<'_, B> {
         }
     }
 
-    /// Sums along b of one phase, for all groups that a visible cell may need.
+    /// AxisSums along b of one phase, for all groups that a visible cell may need.
     fn along_b(&mut self, part: &Part<'_>, phase: usize) {
-        let (view, rim) = (self.view, self.work.rim);
+        let (view, rim) = (self.view, self.scratch.rim);
         let taps = &part.slice.across[0][phase];
-        let (from, to) = (Work::width(view, rim), view.extent[0]);
-        let sums = &mut self.work.along_b[phase];
+        let (from, to) = (SweepScratch::width(view, rim), view.extent[0]);
+        let sums = &mut self.scratch.along_b[phase];
         if part.has_missing {
-            sums.iter_mut().for_each(Sums::with_present);
+            sums.iter_mut().for_each(AxisSums::with_present);
         }
         // Plain sums, and the derivatives along b and along a.
         let kinds = [(0, &taps.weights), (0, &taps.slopes), (1, &taps.weights)];
         let shifted = |sums| shifted(sums, taps.weights.len());
         let sources: Vec<[Vec<&[f32]>; 2]> =
-            self.work.along_a.iter().map(|sums| [shifted(&sums.values), shifted(&sums.present)]).collect();
+            self.scratch.along_a.iter().map(|sums| [shifted(&sums.values), shifted(&sums.present)]).collect();
         for group in 0..view.extent[0] / GROUP {
             let columns = columns_of(view, taps.first, group);
             let at = rim as i64 + taps.first + (group * GROUP) as i64;
             for row in part.bricks.clone() {
-                if columns.is_empty() || !self.blend.shows(part.wide.of(row..row + 1, columns.clone())) {
+                if columns.is_empty() || !self.blend.shows(part.wide.joined(row..row + 1, columns.clone())) {
                     continue;
                 }
                 let (first, rows) = rows_of(row, view.count[1]);
@@ -212,7 +193,7 @@ impl<B: Blend> Band<'_, B> {
         }
     }
 
-    /// Sums along c, and blends.
+    /// AxisSums along c, and blends.
     fn along_c(&mut self, part: &Part<'_>) {
         let view = self.view;
         let count = view.extent[0] / GROUP;
@@ -230,9 +211,9 @@ impl<B: Blend> Band<'_, B> {
                     let at = (((row - self.rows.start) * view.cells + down) * view.cells + phase) * count;
                     let (groups, limits) = (&mut self.groups[at..at + count], &mut self.limits[at..at + count]);
                     if visible[down].live::<B>(phase, limits, &mut live) {
-                        let sums = &self.work.along_b[phase];
+                        let sums = &self.scratch.along_b[phase];
                         let stops = self.stops.get(at..at + count).unwrap_or_default();
-                        let row = Row { least: B::LEAST, stops, ..meets.row((view, part), sums, (across, &live)) };
+                        let row = Row { least: B::LEAST, stops, ..meets.row(view, part, sums, across, &live) };
                         self.blend.add(&row, groups, limits);
                         let over = limits.iter_mut().zip(stops).filter(|(_, stops)| are_over(stops, row.slice));
                         over.for_each(|(limit, _)| *limit = B::OVER);
@@ -312,18 +293,20 @@ impl<'a> Down<'a> {
 
     fn row<'r>(
         &'r self,
-        (view, part): (&SlicedView, &Part<'_>),
-        sums: &'r [Sums],
-        (across, live): (&'r Across, &'r [bool]),
+        view: &SlicedView,
+        part: &Part<'_>,
+        sums: &'r [AxisSums],
+        across: &'r Across,
+        live: &'r [bool],
     ) -> Row<'r> {
         let from = (self.first - part.start()) * view.extent[0];
-        let of = |sums: &'r Sums| RowSums {
+        let from_first = |sums: &'r AxisSums| RowSums {
             values: &sums.values[from..],
             present: part.has_missing.then(|| &sums.present[from..]),
         };
         Row {
-            sums: of(&sums[0]),
-            slopes: sums.get(1..3).map(|slopes| [of(&slopes[0]), of(&slopes[1])]),
+            sums: from_first(&sums[0]),
+            slopes: sums.get(1..3).map(|slopes| [from_first(&slopes[0]), from_first(&slopes[1])]),
             stride: view.extent[0],
             weights: self.weights,
             weight_slopes: self.slopes,
@@ -357,7 +340,7 @@ impl Visible {
         }
         let range = |first: i64, group: usize| {
             let columns = columns_of(view, first, group);
-            Some(part.ranges.of(bricks.clone(), columns)).filter(|range| shows(*range))
+            Some(part.ranges.joined(bricks.clone(), columns)).filter(|range| shows(*range))
         };
         let of_phase = |first: i64| (0..view.extent[0] / GROUP).map(|group| range(first, group)).collect();
         self.ranges = part.slice.across[0].iter().map(|taps| of_phase(taps.first)).collect();

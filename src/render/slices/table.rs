@@ -1,8 +1,8 @@
 //! A transfer function ([Levoy](crate::bibliography)) for one distance of slices: colours times opacity, and opacity,
 //! tabulated over the values (eq 30).
 
-use super::units::Units;
 use crate::colour::TransferFunction;
+use crate::render::batches::Units;
 
 /// Entries of the table. An entry and its slope take 32 bytes, so that the table fits in a first-level cache.
 pub(super) const ENTRIES: usize = 512;
@@ -16,7 +16,7 @@ const NEAR: f64 = 1e-3;
 
 /// The light and opacity of one slice for every value.
 #[derive(Debug, Clone)]
-pub(in crate::render) struct Table {
+pub(super) struct Table {
     transfer: TransferFunction,
     /// Length of a ray between two slices, in units of opacity.
     length: f64,
@@ -44,7 +44,7 @@ fn range(transfer: &TransferFunction) -> (f64, f64) {
 /// The number of steps from the first to the last entry, such that the points of the opacities, and then those of the
 /// colours, lie on entries as nearly as possible. Where a point of the opacities does not, the whole step is transparent
 /// if any of it is: a ray may meet many such values.
-fn steps(transfer: &TransferFunction, (lo, hi): (f64, f64)) -> usize {
+fn steps(transfer: &TransferFunction, lo: f64, hi: f64) -> usize {
     let opacities = transfer.opacity_points();
     let [before, after] = [(lo - 1.0, opacities[0].1), (hi + 1.0, opacities[opacities.len() - 1].1)];
     let opacities = bends([&[before], opacities, &[after]].concat().as_slice());
@@ -88,9 +88,9 @@ pub(super) fn change(transfer: &TransferFunction, length: f64) -> f64 {
 
 impl Table {
     /// The table for slices whose rays are `length` units of opacity long.
-    pub(in crate::render) fn new(transfer: &TransferFunction, length: f64) -> Self {
+    pub(super) fn new(transfer: &TransferFunction, length: f64) -> Self {
         let (lo, hi) = range(transfer);
-        let last = steps(transfer, (lo, hi));
+        let last = steps(transfer, lo, hi);
         let units = Units { zero: lo, per: last as f64 / (hi - lo) };
         let value = |at: f64| light(transfer, length, lo + (at / units.per).min(hi - lo)).map(|number| number as f32);
         let ends: Vec<[f32; 4]> = (0..=ENTRIES).map(|n| if n < last { value(n as f64) } else { value(1e9) }).collect();
@@ -112,7 +112,7 @@ impl Table {
 
     /// A gradient, in these units per world unit, whose direction means little: a hundredth of the range within eight
     /// voxels.
-    pub(in crate::render) fn faint(&self, spacing: f64) -> f64 {
+    pub(super) fn faint(&self, spacing: f64) -> f64 {
         0.01 * LAST as f64 / (8.0 * spacing)
     }
 
@@ -125,7 +125,7 @@ impl Table {
     }
 
     /// Whether a number from `lo` to `hi` has an opacity.
-    pub(super) fn shows(&self, (lo, hi): (f32, f32)) -> bool {
+    pub(super) fn shows(&self, lo: f32, hi: f32) -> bool {
         if lo > hi {
             return false;
         }
@@ -142,9 +142,9 @@ impl Table {
     }
 
     /// The largest error of a slice's light and opacity that the table makes, found at eight values per entry.
-    pub(in crate::render) fn error(&self) -> f64 {
+    pub(super) fn error(&self) -> f64 {
         let off = |value: f64| {
-            let (found, exact) = (self.at(self.units.of(value)), self.exact(value, 1.0));
+            let (found, exact) = (self.at(self.units.number(value)), self.exact(value, 1.0));
             found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs()).fold(0.0, f64::max)
         };
         let values = (0..8 * ENTRIES).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
@@ -165,20 +165,20 @@ mod tests {
     fn a_path_of_unit_length_has_the_requested_opacity() {
         let table = Table::new(&grey().over((10.0, 20.0)).expect("a range"), 1.0);
         for (value, opacity) in [(10.0, 0.0), (12.5, 0.25), (15.0, 0.5), (19.0, 0.9), (25.0, MOST_OPAQUE), (0.0, 0.0)] {
-            let [r, .., minus] = table.at(table.units.of(value));
+            let [r, .., minus] = table.at(table.units.number(value));
             assert!((f64::from(-minus) - opacity).abs() < 1e-5, "{value}");
             let grey = ((value - 10.0) / 10.0).clamp(0.0, 1.0);
             assert!((f64::from(r) - grey * opacity).abs() < 1e-5, "{value}");
         }
         let half = Table::new(&grey().over((10.0, 20.0)).expect("a range"), 0.5);
-        let opacity = -half.at(half.units.of(17.5))[3];
+        let opacity = -half.at(half.units.number(17.5))[3];
         assert!((f64::from(opacity) - 0.5).abs() < 1e-5, "two of these have 0.75: {opacity}");
     }
 
     #[test]
     fn ranges_without_opacity_are_not_visible() {
         let table = Table::new(&grey().with_opacity(&[(0.4, 0.0), (0.5, 1.0), (0.6, 0.0)]).expect("points"), 1.0);
-        let number = |value: f64| table.units.of(value);
+        let number = |value: f64| table.units.number(value);
         for (lo, hi, shows) in [
             (0.0, 0.39, false),
             (0.61, 1.0, false),
@@ -189,9 +189,9 @@ mod tests {
             (0.4123, 0.4124, true),
             (2.0, 9.0, false),
         ] {
-            assert_eq!(table.shows((number(lo), number(hi))), shows, "{lo} to {hi}");
+            assert_eq!(table.shows(number(lo), number(hi)), shows, "{lo} to {hi}");
         }
-        assert!(table.shows((f32::NEG_INFINITY, f32::INFINITY)) && !table.shows((f32::INFINITY, f32::NEG_INFINITY)));
+        assert!(table.shows(f32::NEG_INFINITY, f32::INFINITY) && !table.shows(f32::INFINITY, f32::NEG_INFINITY));
     }
 
     #[test]
@@ -199,8 +199,8 @@ mod tests {
         for points in [vec![(0.2, 0.0), (0.6, 0.3), (0.9, 0.9)], vec![(0.123, 0.0), (0.456, 1.0), (0.789, 0.0)]] {
             let table =
                 Table::new(&grey().with_opacity(&points).expect("points").over((-1.0, 4.0)).expect("a range"), 1.0);
-            let value = |share: f64| table.units.of(-1.0 + 5.0 * share);
-            assert!(!table.shows((value(0.0), value(points[0].0))), "{points:?}");
+            let value = |share: f64| table.units.number(-1.0 + 5.0 * share);
+            assert!(!table.shows(value(0.0), value(points[0].0)), "{points:?}");
         }
     }
 

@@ -109,7 +109,7 @@ impl SlicedView {
         let cells = config.mode.slices().unwrap_or_else(|| default_cells(&config.mode, &sigma, pixels));
         let deeper = camera.step(shear.axes[2], 1.0)[2];
         let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
-        let fineness = config.mode.slices().unwrap_or_else(|| default_slices(&config.mode, sigma[2], (voxel, grid)));
+        let fineness = config.mode.slices().unwrap_or_else(|| default_slices(&config.mode, sigma[2], voxel, grid));
         let step = voxel / fineness as f64;
         let mut cut = Self {
             camera,
@@ -309,7 +309,7 @@ fn default_cells(mode: &Mode, sigma: &[f64; 3], pixels: f64) -> usize {
 
 /// The default number of slices per voxel for a kernel of `sigma` voxels. `voxel` is the length of a ray along which it
 /// crosses a voxel.
-fn default_slices(mode: &Mode, sigma: f64, (voxel, grid): (f64, &Grid)) -> usize {
+fn default_slices(mode: &Mode, sigma: f64, voxel: f64, grid: &Grid) -> usize {
     match mode {
         Mode::Composite { transfer, unit, .. } => {
             let length = voxel / unit.unwrap_or_else(|| grid.largest_spacing());

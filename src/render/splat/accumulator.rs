@@ -1,15 +1,14 @@
 //! A band of a picture that accumulates blocks, and its tiles after the last block.
 
 use super::backend::SplatBackend;
-use super::band::{Band, SplatStats, splat_in_batches};
+use super::band::{Band, splat_into};
 use super::footprints::{FootprintBands, Tile};
 use super::lattice::{Cells, DoubleRoom, FilteredCells, Gather, Lattice, Ones};
 use super::lattice_bands::LatticeBands;
 use super::tile_rect::{TILE, TileRect};
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;
-use crate::render::layout::Layout;
-use crate::render::plane_values::BlockSource;
+use crate::render::batches::{BlockReader, Layout, ReadStats};
 use crate::wavelet::Lane;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -161,15 +160,15 @@ impl<T: Copy> Pixels<'_, T> {
     }
 }
 
-/// Splats all blocks in order, `batch` at a time, each into all bands that it reaches. A block is decoded once for all
+/// Splats all blocks in order, each into all bands that it reaches. A block is decoded once for all
 /// bands that take footprints, and once for all bands that have a lattice. If these need more `room` than there is, the
 /// bands have no sums.
 pub(in crate::render) fn splat(
     accumulators: &mut [BandAccumulator<'_>],
-    blocks: (&[usize], usize),
-    source: &dyn BlockSource,
+    blocks: &[usize],
+    reader: &BlockReader<'_>,
     room: &DoubleRoom,
-) -> Result<SplatStats> {
+) -> Result<ReadStats> {
     let (mut tiles, mut cells) = (Vec::new(), Vec::new());
     let planes = accumulators.first().map_or(0, |accumulator| accumulator.planes);
     for BandAccumulator { band, sums, .. } in accumulators.iter_mut() {
@@ -179,11 +178,11 @@ pub(in crate::render) fn splat(
             BandSums::Filtered(..) => {}
         }
     }
-    let mut stats = splat_in_batches(&mut LatticeBands::new(cells, room), blocks, source)?;
+    let mut stats = splat_into(&mut LatticeBands::new(cells, room), blocks, reader)?;
     if room.is_exceeded() {
         return Ok(stats);
     }
-    stats += splat_in_batches(&mut FootprintBands::new(tiles, planes), blocks, source)?;
+    stats += splat_into(&mut FootprintBands::new(tiles, planes), blocks, reader)?;
     accumulators.iter_mut().for_each(BandAccumulator::filter);
     Ok(stats)
 }

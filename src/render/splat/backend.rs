@@ -3,7 +3,7 @@
 //! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels
 //! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
 
-use super::lattice::{Lattice, SliceError, Volume};
+use super::lattice::{Lattice, SliceError, SplattedView};
 use super::tile_rect::{TILE, pixels_reached};
 use crate::base::grid::{Grid, Region};
 use crate::render::config::{BACKGROUND, Quantity, RenderConfig, most_splat_error, splat_method};
@@ -32,13 +32,7 @@ pub(super) fn footprint_method(config: &RenderConfig) -> Method {
 impl SplatBackend {
     /// Chooses the backend of a view, and the method named in reports. Certified pictures take footprints. `slices` is
     /// the largest number of slices that a ray meets, in units of the largest sum of weights in the picture.
-    pub(super) fn choose(
-        config: &RenderConfig,
-        volume: Volume<'_>,
-        camera: &Camera,
-        footprint: &Footprint,
-        slices: f64,
-    ) -> (Self, Method) {
+    pub(super) fn choose(config: &RenderConfig, view: &SplattedView<'_>, slices: f64) -> (Self, Method) {
         let error = most_splat_error(config.quantity, config.splat_error);
         let stated = |slice: SliceError| match config.quantity {
             Quantity::Mean => slices * slice.of_a_mean(),
@@ -49,8 +43,8 @@ impl SplatBackend {
             Quantity::Emission => slices * slice.of_waves,
         };
         let lattice = || match config.quick {
-            true => Lattice::quick(config.kernel, volume, camera, footprint, estimated),
-            false => Lattice::within(error, config.kernel, volume, camera, footprint, stated),
+            true => Lattice::quick(view, estimated),
+            false => Lattice::within(error, view, stated),
         };
         match (!config.certify).then(lattice).flatten() {
             Some((lattice, method)) => (Self::Lattice(Arc::new(lattice)), method),

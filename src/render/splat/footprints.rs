@@ -9,8 +9,7 @@ use super::sparse_terms::SparseTerms;
 use super::tile_rect::{TileRect, intersect, overlap};
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;
-use crate::render::layout::Order;
-use crate::render::plane_values::BlockPlanes;
+use crate::render::batches::{BlockAdder, BlockPlanes, Order};
 use crate::view::footprint::Footprint;
 use crate::wavelet::Lane;
 use rayon::prelude::*;
@@ -38,14 +37,16 @@ impl<'a, 'c> FootprintBands<'a, 'c> {
 }
 
 impl BandGroup for FootprintBands<'_, '_> {
-    type Block<'b> = ProjectedBlock;
-
     fn bands(&self) -> &[Band<'_>] {
         &self.bands
     }
+}
+
+impl BlockAdder for FootprintBands<'_, '_> {
+    type Block<'b> = ProjectedBlock;
 
     fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<ProjectedBlock> {
-        let terms = SparseTerms::of(planes.as_ref(), self.planes)?;
+        let terms = SparseTerms::from_block(planes.as_ref(), self.planes)?;
         let splats = |band: &Band<'_>| band.sees(block).then(|| Splats::new(&terms, block, band.setup));
         Ok(ProjectedBlock { splats: self.bands.iter().map(splats).collect(), terms })
     }
@@ -108,26 +109,27 @@ impl Tile {
             // Weights start at the footprint's own edge, so that a tile's edge cannot change their last bits.
             footprint.weights(voxel.x, &full_x, &mut row);
             footprint.weights(voxel.y, &full_y, &mut column);
-            let row = (x.start, &row[x.start - full_x.start..x.end - full_x.start]);
-            let column = (y.start, &column[y.start - full_y.start..y.end - full_y.start]);
+            let row = &row[x.start - full_x.start..x.end - full_x.start];
+            let column = &column[y.start - full_y.start..y.end - full_y.start];
+            let pixel = [x.start, y.start];
             let (planes, values) = terms.of_voxel(voxel.index);
             match self.order {
                 Order::Planes => {
                     for (plane, value) in planes.iter().zip(values) {
-                        self.add(usize::from(*plane), value * voxel.weight, row, column);
+                        self.add(usize::from(*plane), value * voxel.weight, pixel, row, column);
                     }
                 }
                 Order::Pixels => {
                     all.fill(0.0);
                     planes.iter().zip(values).for_each(|(p, a)| all[usize::from(*p)] = a * voxel.weight);
-                    self.add_all(&all, row, column);
+                    self.add_all(&all, pixel, row, column);
                 }
             }
         }
     }
 
-    /// Adds `value` times the outer product of a row and a column of weights to a plane.
-    fn add(&mut self, plane: usize, value: f64, (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
+    /// Adds `value` times the outer product of a row and a column of weights to a plane, from a pixel on.
+    fn add(&mut self, plane: usize, value: f64, [x, y]: [usize; 2], row: &[f64], column: &[f64]) {
         let TileRect { x: xs, y: ys } = &self.rect;
         let (width, pixels) = (xs.len(), self.rect.pixels());
         let start = plane * pixels + (y - ys.start) * width + (x - xs.start);
@@ -135,7 +137,7 @@ impl Tile {
     }
 
     /// Adds a value for every plane, as [`Self::add`] does for one.
-    fn add_all(&mut self, values: &[f64], (x, row): (usize, &[f64]), (y, column): (usize, &[f64])) {
+    fn add_all(&mut self, values: &[f64], [x, y]: [usize; 2], row: &[f64], column: &[f64]) {
         let TileRect { x: xs, y: ys } = &self.rect;
         let width = xs.len();
         let start = ((y - ys.start) * width + (x - xs.start)) * self.count;

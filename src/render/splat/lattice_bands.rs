@@ -1,9 +1,9 @@
 //! The lattice backend: spreads the values of all voxels, plane by plane, to the cells of each view's lattice.
 
 use super::band::{Band, BandGroup};
-use super::lattice::{CellPlane, Cells, DoubleRoom, Lattice, Placed, Rectangle, Work};
+use super::lattice::{CellPlane, Cells, DoubleRoom, Lattice, Placed, Rectangle, SpreadScratch};
 use crate::base::error::Result;
-use crate::render::plane_values::{BlockPlanes, Scratch};
+use crate::render::batches::{BlockAdder, BlockPlanes, Scratch};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -16,7 +16,7 @@ pub(super) struct LatticeBands<'a, 'c> {
     rectangles: Vec<Rectangle>,
     room: &'c DoubleRoom,
     /// Buffers for reuse: fresh memory from the system costs as much as the work done in it.
-    spare: Mutex<Vec<(Scratch, Work<f32>)>>,
+    spare: Mutex<Vec<(Scratch, SpreadScratch<f32>)>>,
 }
 
 /// A block and its location in every band that it reaches.
@@ -53,11 +53,13 @@ impl<'a, 'c> LatticeBands<'a, 'c> {
 }
 
 impl BandGroup for LatticeBands<'_, '_> {
-    type Block<'b> = PlacedBlock<'b>;
-
     fn bands(&self) -> &[Band<'_>] {
         &self.bands
     }
+}
+
+impl BlockAdder for LatticeBands<'_, '_> {
+    type Block<'b> = PlacedBlock<'b>;
 
     fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<PlacedBlock<'b>> {
         let placed = (0..self.bands.len()).map(|band| self.locate(band, block)).collect();
@@ -75,14 +77,14 @@ impl BandGroup for LatticeBands<'_, '_> {
             if room.is_exceeded() {
                 return Ok(());
             }
-            let (mut scratch, mut work) = lock(spare).pop().unwrap_or_default();
+            let (mut scratch, mut spreading) = lock(spare).pop().unwrap_or_default();
             for PlacedBlock { planes, placed } in blocks {
                 let values = planes.plane(plane, &mut scratch)?;
                 for (sums, placed) in bands.iter_mut().zip(placed) {
-                    placed.iter().for_each(|placed| placed.add(values, sums, &mut work));
+                    placed.iter().for_each(|placed| placed.add(values, sums, &mut spreading));
                 }
             }
-            lock(spare).push((scratch, work));
+            lock(spare).push((scratch, spreading));
             Ok(())
         })
     }

@@ -6,7 +6,7 @@
 //! a block           plane values, from a scene                                      (read by workers)
 //!   footprints      sparse_terms -> footprints: each voxel's footprint into the tiles of the band
 //!   lattice         lattice_bands -> lattice: spread to cells, plane by plane
-//! a tile            accumulator: its planes, pixel by pixel, for [`super::reconstruct`] to invert
+//! a tile            accumulator: its planes, pixel by pixel, for [`super::projection`] to invert
 //! ```
 //!
 //! These modules know neither the meaning of planes nor the source of blocks.
@@ -14,8 +14,8 @@
 pub(super) mod tile_rect;
 pub(super) mod lattice;
 pub(super) mod backend;
-pub(super) mod view_setup;
 pub(super) mod reference_weights;
+mod view_setup;
 pub(super) mod sparse_terms;
 mod band;
 pub(super) mod footprints;
@@ -23,6 +23,5 @@ mod lattice_bands;
 pub(super) mod accumulator;
 
 pub(super) use accumulator::{BandAccumulator, Pixels, ResolvedTile, splat};
-pub(super) use band::SplatStats;
 pub(in crate::render) use lattice::{DoubleRoom, FilteredCells, Ones};
 pub(super) use view_setup::ViewSetup;

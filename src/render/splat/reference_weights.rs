@@ -3,50 +3,33 @@
 //! They also bound the contribution of voxels beyond a depth, since weights fall as exp(-tau z) (eq 3), so that the
 //! deepest voxels can be left out.
 
-use super::backend::SplatBackend;
 use super::lattice::Shear;
-use super::view_setup::ViewSetup;
 use crate::base::error::Result;
-use crate::base::grid::Region;
-use crate::render::config::{RenderConfig, most_splat_error};
-use crate::view::footprint::{Footprint, Method};
+use crate::base::grid::{Grid, Region};
+use crate::view::camera::Camera;
+use crate::view::footprint::{Footprint, Kernel, Method};
 use std::ops::Range;
-
-/// Chooses the backend of a view.
-pub(in crate::render) fn with_backend(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
-    let exact = Footprint::new(config.kernel, &setup.grid, setup.camera.scale, Method::EXACT)?;
-    let slices = ReferenceWeights::new(&setup, &exact).slices();
-    let volume = (&setup.grid, &setup.clip, setup.blocks);
-    (setup.backend, setup.method) = SplatBackend::choose(config, volume, &setup.camera, &setup.footprint, slices);
-    setup.stated_error = setup.method.stated_error;
-    Ok(setup)
-}
-
-/// Leaves out voxels so deep that their contribution fits in the part of the splat error that the method leaves.
-pub(in crate::render) fn without_dim_voxels(mut setup: ViewSetup, config: &RenderConfig) -> Result<ViewSetup> {
-    let share = most_splat_error(config.quantity, config.splat_error) - setup.stated_error;
-    if config.certify || setup.tau == 0.0 || share <= 0.0 {
-        return Ok(setup);
-    }
-    let exact = Footprint::new(config.kernel, &setup.grid, setup.camera.scale, Method::EXACT)?;
-    let deepest = ReferenceWeights::new(&setup, &exact).deepest(share);
-    if deepest < setup.camera.depth(&setup.grid) {
-        (setup.deepest, setup.stated_error) = (deepest, setup.stated_error + share);
-    }
-    Ok(setup)
-}
 
 /// Sums of uncut weights of a view at single pixels.
 pub(in crate::render) struct ReferenceWeights<'a> {
-    setup: &'a ViewSetup,
-    footprint: &'a Footprint,
+    camera: &'a Camera,
+    grid: &'a Grid,
+    /// The voxels that count.
+    clip: Region,
+    tau: f64,
+    /// It stands for an uncut one.
+    footprint: Footprint,
     shear: Shear,
 }
 
 impl<'a> ReferenceWeights<'a> {
-    /// Sums of weights by `footprint`, which stands for an uncut one.
-    pub(in crate::render) fn new(setup: &'a ViewSetup, footprint: &'a Footprint) -> Self {
-        Self { setup, footprint, shear: Shear::new(&setup.camera, &setup.grid, 1) }
+    /// Sums of the weights of the voxels in `clip`.
+    ///
+    /// # Errors
+    /// A kernel whose weights are no numbers.
+    pub(in crate::render) fn new(camera: &'a Camera, grid: &'a Grid, clip: Region, kernel: Kernel) -> Result<Self> {
+        let footprint = Footprint::new(kernel, grid, camera.scale, Method::EXACT)?;
+        Ok(Self { camera, grid, clip, tau: kernel.tau, footprint, shear: Shear::new(camera, grid, 1) })
     }
 
     /// The sum at a pixel's centre.
@@ -57,7 +40,7 @@ impl<'a> ReferenceWeights<'a> {
     /// The sum at a point of the picture plane, over the voxels within reach, slice by slice and row by row.
     fn at_point(&self, point: [f64; 2]) -> f64 {
         let [b, c, a] = self.shear.axes;
-        let clip = &self.setup.clip;
+        let clip = &self.clip;
         let point = [0, 1].map(|i| point[i] - self.shear.origin[i]);
         let [_, v] = self.shear.cells(point);
         let half = self.half(1);
@@ -81,7 +64,7 @@ impl<'a> ReferenceWeights<'a> {
     /// the slice.
     pub(in crate::render) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
-        let (tau, dims) = (self.setup.tau, self.setup.clip.dims());
+        let (tau, dims) = (self.tau, self.clip.dims());
         let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i)) / slopes[i].abs() + 1.0;
         let slices = (dims[axes[2]] as f64).min(beside(0)).min(beside(1)).ceil() as usize;
         let (deeper, nearer) = (self.deeper(), self.nearer());
@@ -92,13 +75,13 @@ impl<'a> ReferenceWeights<'a> {
     /// An upper bound of the sums of all slices that a ray meets, each as if the slice were infinite, as a multiple of
     /// the largest sum in the picture plane. Near 1, except for volumes that are thin or dimmed.
     pub(super) fn slices(&self) -> f64 {
-        let Region { start, end } = &self.setup.clip;
+        let Region { start, end } = &self.clip;
         let point = |share: f64| {
             let voxel = [0, 1, 2].map(|a| start[a] + ((end[a] - 1 - start[a]) as f64 * share).round() as usize);
-            let [x, y, _] = self.setup.camera.project(self.setup.grid.position(voxel));
+            let [x, y, _] = self.camera.project(self.grid.position(voxel));
             self.at_point([x, y])
         };
-        let shares = if self.setup.tau == 0.0 { &[0.5][..] } else { &[0.0, 0.25, 0.5, 0.75, 1.0] };
+        let shares = if self.tau == 0.0 { &[0.5][..] } else { &[0.0, 0.25, 0.5, 0.75, 1.0] };
         self.most() / shares.iter().map(|share| point(*share)).fold(0.0, f64::max)
     }
 
@@ -110,8 +93,8 @@ impl<'a> ReferenceWeights<'a> {
     /// ```text
     /// sum over n of S exp(-tau max(z, r_n - e)) <= S exp(-tau z) (2 e / d + 1 + 1 / (1 - exp(-tau d)))
     /// ```
-    pub(in crate::render) fn deepest(&self, share: f64) -> f64 {
-        let (tau, deeper, nearer) = (self.setup.tau, self.deeper(), self.nearer());
+    pub(super) fn deepest(&self, share: f64) -> f64 {
+        let (tau, deeper, nearer) = (self.tau, self.deeper(), self.nearer());
         let slices = 2.0 * nearer / deeper + 1.0 - 1.0 / libm::expm1(-tau * deeper);
         self.nearest() + libm::log(self.slice() * slices / share) / tau
     }
@@ -128,14 +111,14 @@ impl<'a> ReferenceWeights<'a> {
     }
 
     fn nearest(&self) -> f64 {
-        self.setup.camera.nearest_of(&self.setup.grid.crop(&self.setup.clip))
+        self.camera.nearest_of(&self.grid.crop(&self.clip))
     }
 
     /// An upper bound of the sum of weights of a slice at any point, in units of a voxel's own weight: the sum at a voxel
     /// with as many voxels to each side as the volume has.
     fn slice(&self) -> f64 {
         let [b, c] = self.shear.pixels;
-        let dims = self.setup.clip.dims();
+        let dims = self.clip.dims();
         let [most, rows] = [0, 1].map(|i| self.half(i).min(dims[self.shear.axes[i]] as f64).ceil() as isize);
         let weight = |i: isize, j: isize| {
             let [x, y] = [0, 1].map(|n| i as f64 * b[n] + j as f64 * c[n]);
@@ -176,46 +159,4 @@ fn around(centre: f64, half: f64, all: Range<usize>) -> Range<usize> {
     let end = (centre + half + 1.0).floor().clamp(0.0, all.end as f64) as usize;
     let start = (centre - half).ceil().clamp(all.start as f64, all.end as f64) as usize;
     start.min(end)..end
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::base::grid::{BlockGrid, Grid};
-    use crate::render::config::{Limit, Mode, Quantity};
-    use crate::view::camera::View;
-    use crate::view::footprint::Kernel;
-
-    /// The setup of a view of 128^3 voxels with the default settings.
-    fn setup(azimuth: f64, elevation: f64, quantity: Quantity) -> ViewSetup {
-        let grid = Grid::unit([128; 3]);
-        let view = View { azimuth, elevation, roll: 0.0, size: [512; 2], scale: Some(2.3), center: None };
-        let config = RenderConfig {
-            mode: Mode::Projection,
-            views: vec![view],
-            kernel: Kernel::of_grid(&grid),
-            quantity,
-            frames: vec![0],
-            paired: false,
-            region: None,
-            splat_error: 1e-3,
-            quick: false,
-            allowed: None,
-            limited: Limit::Certified,
-            certify: false,
-            memory: 1 << 29,
-        };
-        let setup = ViewSetup::new((grid, BlockGrid::cubes(grid.dims, 32)), &config, &view);
-        setup.and_then(|setup| with_backend(setup, &config)).expect("a valid view")
-    }
-
-    #[test]
-    fn ordinary_views_take_the_lattice() {
-        for (azimuth, elevation) in [(0.0, 0.0), (3.0, 2.0), (17.0, 11.0), (30.0, 30.0), (45.0, 35.26), (80.0, 70.0)] {
-            for quantity in [Quantity::Mean, Quantity::Emission] {
-                let setup = setup(azimuth, elevation, quantity);
-                assert!(setup.backend.is_lattice() && setup.stated_error <= 1e-3, "{azimuth} {elevation} {quantity:?}");
-            }
-        }
-    }
 }

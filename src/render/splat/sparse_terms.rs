@@ -1,7 +1,7 @@
 //! The nonzero values of a block, voxel by voxel, as the footprint backend needs them.
 
 use crate::base::error::Result;
-use crate::render::plane_values::{BlockPlanes, Scratch};
+use crate::render::batches::{BlockPlanes, Scratch};
 
 /// The values of a block: for each voxel in array order, a list of (plane, value).
 #[derive(Debug)]
@@ -20,7 +20,7 @@ impl SparseTerms {
     }
 
     /// Collects the values of a block in `planes` planes.
-    pub(in crate::render) fn of(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {
+    pub(in crate::render) fn from_block(block: &dyn BlockPlanes, planes: usize) -> Result<Self> {
         let (mut found, mut scratch) = (Vec::new(), Scratch::default());
         let mut ends = vec![0_u32; block.voxels() + 1];
         for plane in 0..planes {
@@ -57,7 +57,7 @@ impl SparseTerms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::plane_values::PlaneValues;
+    use crate::render::batches::PlaneValues;
 
     #[test]
     fn every_voxel_has_the_terms_of_all_planes() {
@@ -73,7 +73,7 @@ mod tests {
                 [0; 2]
             }
         }
-        let terms = SparseTerms::of(&Three, 3).expect("no block fails here");
+        let terms = SparseTerms::from_block(&Three, 3).expect("no block fails here");
         assert_eq!(terms.of_voxel(0), (&[][..], &[][..]));
         assert_eq!(terms.of_voxel(1), (&[0][..], &[1.5][..]));
         assert_eq!(terms.of_voxel(2), (&[0, 2][..], &[2.0, -1.0][..]));

@@ -1,10 +1,12 @@
 //! The setup of a view, shared by all frames: camera, kernel, backend and the voxels to splat.
 
 use super::backend::{SplatBackend, footprint_method};
+use super::lattice::SplattedView;
+use super::reference_weights::ReferenceWeights;
 use super::tile_rect::overlap;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{BlockGrid, Grid, Region};
-use crate::render::config::{Quantity, RenderConfig};
+use crate::render::config::{Quantity, RenderConfig, most_splat_error};
 use crate::view::camera::{Camera, View};
 use crate::view::footprint::{Footprint, Method};
 use std::ops::Range;
@@ -18,7 +20,6 @@ const MOST_EXPONENT: f64 = 640.0;
 pub(in crate::render) struct ViewSetup {
     pub(in crate::render) camera: Camera,
     pub(in crate::render) footprint: Footprint,
-    pub(in crate::render) tau: f64,
     pub(in crate::render) grid: Grid,
     pub(in crate::render) blocks: BlockGrid,
     /// The voxels that are splatted.
@@ -33,26 +34,26 @@ pub(in crate::render) struct ViewSetup {
 }
 
 impl ViewSetup {
-    /// The setup of a view of `grid`, which is cut into `blocks`, with footprints.
+    /// The setup of a view of `grid`, which is cut into `blocks`.
     ///
     /// # Errors
     /// A region outside the volume, a camera without a picture, or an attenuation that leaves no weights.
-    pub(in crate::render) fn new(
-        (grid, blocks): (Grid, BlockGrid),
-        config: &RenderConfig,
-        view: &View,
-    ) -> Result<Self> {
-        let clip = config.clip(&grid)?;
-        let camera = Camera::new(view, &grid)?;
-        let footprint = Footprint::new(config.kernel, &grid, camera.scale, footprint_method(config))?;
-        let nearest = camera.nearest_of(&grid.crop(&clip));
-        if config.quantity == Quantity::Mean && config.kernel.tau * nearest > MOST_EXPONENT {
-            let what = "all voxels of the region lie so deep that their weights are beyond numbers";
-            return Err(Error::setting("tau", format!("{what} (tau {:e})", config.kernel.tau)));
-        }
-        let (tau, method, deepest) = (config.kernel.tau, footprint_method(config), f64::INFINITY);
-        let (backend, stated_error) = (SplatBackend::Footprints, method.stated_error);
-        Ok(Self { camera, footprint, tau, grid, blocks, clip, backend, method, stated_error, deepest })
+    pub(in crate::render) fn new(grid: &Grid, blocks: BlockGrid, config: &RenderConfig, view: &View) -> Result<Self> {
+        let (clip, kernel) = (config.clip(grid)?, config.kernel);
+        let camera = Camera::new(view, grid)?;
+        let footprint = Footprint::new(kernel, grid, camera.scale, footprint_method(config))?;
+        check_attenuation(config, camera.nearest_of(&grid.crop(&clip)))?;
+        let reference = ReferenceWeights::new(&camera, grid, clip, kernel)?;
+        let splatted = SplattedView { kernel, grid, clip: &clip, blocks, camera: &camera, footprint: &footprint };
+        let (backend, method) = SplatBackend::choose(config, &splatted, reference.slices());
+        let share = most_splat_error(config.quantity, config.splat_error) - method.stated_error;
+        let leaves_out = !config.certify && kernel.tau != 0.0 && share > 0.0;
+        let deepest = if leaves_out { reference.deepest(share) } else { f64::INFINITY };
+        let (deepest, stated_error) = match deepest < camera.depth(grid) {
+            true => (deepest, method.stated_error + share),
+            false => (f64::INFINITY, method.stated_error),
+        };
+        Ok(Self { camera, footprint, grid: *grid, blocks, clip, backend, method, stated_error, deepest })
     }
 
     pub(in crate::render) fn pixels(&self) -> usize {
@@ -87,5 +88,53 @@ impl ViewSetup {
             return [0..0, 0..0];
         }
         self.backend.pixels_reached(&region, &self.grid, &self.camera, &self.footprint)
+    }
+}
+
+/// An error if no weight is left at the depth of the nearest voxel.
+fn check_attenuation(config: &RenderConfig, nearest: f64) -> Result<()> {
+    if config.quantity == Quantity::Mean && config.kernel.tau * nearest > MOST_EXPONENT {
+        let what = "all voxels of the region lie so deep that their weights are beyond numbers";
+        return Err(Error::setting("tau", format!("{what} (tau {:e})", config.kernel.tau)));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::config::{Limit, Mode};
+    use crate::view::footprint::Kernel;
+
+    /// The setup of a view of 128^3 voxels with the default settings.
+    fn setup(azimuth: f64, elevation: f64, quantity: Quantity) -> ViewSetup {
+        let grid = Grid::unit([128; 3]);
+        let view = View { azimuth, elevation, roll: 0.0, size: [512; 2], scale: Some(2.3), center: None };
+        let config = RenderConfig {
+            mode: Mode::Projection,
+            views: vec![view],
+            kernel: Kernel::of_grid(&grid),
+            quantity,
+            frames: vec![0],
+            paired: false,
+            region: None,
+            splat_error: 1e-3,
+            quick: false,
+            allowed: None,
+            limited: Limit::Certified,
+            certify: false,
+            memory: 1 << 29,
+        };
+        ViewSetup::new(&grid, BlockGrid::cubes(grid.dims, 32), &config, &view).expect("a valid view")
+    }
+
+    #[test]
+    fn ordinary_views_take_the_lattice() {
+        for (azimuth, elevation) in [(0.0, 0.0), (3.0, 2.0), (17.0, 11.0), (30.0, 30.0), (45.0, 35.26), (80.0, 70.0)] {
+            for quantity in [Quantity::Mean, Quantity::Emission] {
+                let setup = setup(azimuth, elevation, quantity);
+                assert!(setup.backend.is_lattice() && setup.stated_error <= 1e-3, "{azimuth} {elevation} {quantity:?}");
+            }
+        }
     }
 }

@@ -25,7 +25,7 @@ fn opacities(case: &Case, surface: Surface) -> Vec<f64> {
 
 /// Asserts that opacities are within a root mean square and a largest difference of shares, over pixels that are covered
 /// in part, and that their sum is that of the shares to a hundredth of the edge.
-fn check(name: &str, (found, expected): (&[f64], &[f64]), (rms, most): (f64, f64)) {
+fn check(name: &str, found: &[f64], expected: &[f64], rms: f64, most: f64) {
     let edge: Vec<usize> = (0..expected.len()).filter(|n| (1e-9..1.0 - 1e-9).contains(&expected[*n])).collect();
     let off: Vec<f64> = edge.iter().map(|n| (found[*n] - expected[*n]).abs()).collect();
     let (found_rms, largest) = errors(&off);
@@ -60,7 +60,7 @@ fn silhouettes_are_smooth() {
                 let both = opacity * (2.0 - opacity);
                 let found: Vec<f64> = found.iter().map(|o| o / both).collect();
                 let name = format!("{} {} {value} {opacity}", view.azimuth, view.elevation);
-                check(&name, (&found, &expected), (0.1, 0.45));
+                check(&name, &found, &expected, 0.1, 0.45);
             }
         }
     }
@@ -93,7 +93,7 @@ fn surfaces_end_at_the_faces_of_the_volume() {
             };
             let expected = covered(&view, is_covered);
             let found = opacities(&case, Surface { value, colour: [1.0; 3], opacity: 1.0 });
-            check(&format!("view {n}, axis {axis}, {region:?}"), (&found, &expected), (0.12, 0.4));
+            check(&format!("view {n}, axis {axis}, {region:?}"), &found, &expected, 0.12, 0.4);
         }
     }
 }

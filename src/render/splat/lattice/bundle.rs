@@ -40,7 +40,7 @@ impl<'a> Bundles<'a> {
     /// The bundles for the cells in `tile`. The ones are the filtered cells of the value 1 at all voxels.
     pub(super) fn new(cells: &'a FilteredCells, tile: &Window, ones: Option<&FilteredCells>) -> Self {
         let offset = cells.doubles.iter();
-        let offset = offset.filter_map(|(number, sums)| OffsetPlane::new(cells, (*number, sums), tile));
+        let offset = offset.filter_map(|(number, sums)| OffsetPlane::new(cells, *number, sums, tile));
         let offset: Vec<OffsetPlane> = offset.collect();
         let is_offset = |number: usize| offset.iter().any(|plane| plane.number == number);
         let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, is_offset)).collect();
@@ -87,7 +87,7 @@ struct OffsetPlane {
 
 impl OffsetPlane {
     /// The plane with these sums in f64; `None` if they are zero in the tile.
-    fn new(cells: &FilteredCells, (number, double): (usize, &[f64]), tile: &Window) -> Option<Self> {
+    fn new(cells: &FilteredCells, number: usize, double: &[f64], tile: &Window) -> Option<Self> {
         let mut sums = vec![0.0; tile.size[0] * tile.size[1]];
         let width = cells.window.size[0];
         add_part(&cells.window, tile, &mut sums, |u, v| double[v * width + u]);

@@ -94,7 +94,7 @@ pub(super) struct Aligned<R> {
 }
 
 impl<R: Real> Aligned<R> {
-    pub(super) fn of(len: usize) -> Self {
+    pub(super) fn zeros(len: usize) -> Self {
         // Written here: memory that is read before it is written costs twice.
         let mut numbers = Vec::with_capacity(len + LINE - 1);
         numbers.resize(len + LINE - 1, R::default());
@@ -104,7 +104,7 @@ impl<R: Real> Aligned<R> {
 
     /// The same memory for `len` numbers, if it is large enough; new memory otherwise.
     pub(super) fn resized(self, len: usize) -> Self {
-        if self.first + len <= self.numbers.len() { Self { len, ..self } } else { Self::of(len) }
+        if self.first + len <= self.numbers.len() { Self { len, ..self } } else { Self::zeros(len) }
     }
 }
 
@@ -207,27 +207,29 @@ impl CellPlane<'_> {
         let (area, room) = (self.rectangle.area(), self.room);
         self.sums.double.get_or_insert_with(|| {
             room.used.fetch_add(1, Relaxed);
-            Aligned::of(area)
+            Aligned::zeros(area)
         })
     }
 
     /// Adds `scale` times the cells of another rectangle to the sums in f32.
     pub(super) fn add_single(&mut self, rectangle: &Rectangle, sums: &[f32], scale: f32) {
         let own = self.rectangle;
-        add_rectangle((&own, self.single()), (rectangle, sums), |to, from| add_scaled_single(to, from, scale));
+        add_rectangle(&own, self.single(), rectangle, sums, |to, from| add_scaled_single(to, from, scale));
     }
 
     /// Adds `scale` times the cells of another rectangle to the sums in f64.
     pub(super) fn add_double<R: Real>(&mut self, rectangle: &Rectangle, sums: &[R], scale: f64) {
         let own = self.rectangle;
-        add_rectangle((&own, self.double()), (rectangle, sums), |to, from| add_scaled_double(to, from, scale));
+        add_rectangle(&own, self.double(), rectangle, sums, |to, from| add_scaled_double(to, from, scale));
     }
 }
 
 /// Calls `add(to, from)` for all runs of cells that two rectangles share.
 fn add_rectangle<S, R>(
-    (own, sums): (&Rectangle, &mut [S]),
-    (rectangle, more): (&Rectangle, &[R]),
+    own: &Rectangle,
+    sums: &mut [S],
+    rectangle: &Rectangle,
+    more: &[R],
     add: impl Fn(&mut [S], &[R]),
 ) {
     for (v, from) in (rectangle.first[1]..).zip(more.chunks_exact(rectangle.size[0])) {

@@ -30,6 +30,9 @@ use super::kernel::Kernel;
 use super::prefilter::{HALF, Taps};
 use super::spline::spread;
 
+/// Cells per voxel, and the degree of the splines.
+pub(super) type Choice = [usize; 2];
+
 /// Upper bounds for an infinite slice of voxels, as shares of its largest sum of weights.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct SliceError {
@@ -43,16 +46,16 @@ pub(in crate::render) struct SliceError {
 
 impl SliceError {
     /// The error of a choice of cells per voxel and degree of splines, filtered along u and v.
-    pub(super) fn new(weighting: &Weighting<'_>, choice: (usize, usize), taps: &[Taps; 2]) -> Self {
+    pub(super) fn new(weighting: &Weighting<'_>, choice: Choice, taps: &[Taps; 2]) -> Self {
         Self::at_positions(weighting, choice, taps, 1)
     }
 
     /// A lower bound of these bounds, from few positions.
-    pub(super) fn at_least(weighting: &Weighting<'_>, choice: (usize, usize), taps: &[Taps; 2]) -> Self {
+    pub(super) fn at_least(weighting: &Weighting<'_>, choice: Choice, taps: &[Taps; 2]) -> Self {
         Self::at_positions(weighting, choice, taps, FEW)
     }
 
-    fn at_positions(weighting: &Weighting<'_>, choice: (usize, usize), taps: &[Taps; 2], step: usize) -> Self {
+    fn at_positions(weighting: &Weighting<'_>, choice: Choice, taps: &[Taps; 2], step: usize) -> Self {
         let Weighting { kernel, cut, additions } = *weighting;
         let (marginal, conditional) = (kernel.sigmas(), kernel.conditional_sigmas());
         let axis = |i: usize| Axis::new(choice, &taps[i], [conditional[i], marginal[i]], step);
@@ -131,7 +134,7 @@ const FAR: f64 = 8.0;
 
 impl Axis {
     /// The bounds for a Gaussian with a `conditional` and a `marginal` deviation in cells (eq 39).
-    fn new((fineness, degree): (usize, usize), taps: &Taps, [conditional, marginal]: [f64; 2], step: usize) -> Self {
+    fn new([fineness, degree]: Choice, taps: &Taps, [conditional, marginal]: [f64; 2], step: usize) -> Self {
         let mut most = Self::default();
         let mut largest = [0.0_f64; 2];
         let tables = [conditional, marginal].map(Table::new);
@@ -272,7 +275,7 @@ mod tests {
             for (fineness, degree, error) in [(2, 3, 2.3e-3), (2, 4, 8.5e-4), (2, 5, 6e-4), (3, 4, 3.5e-4)] {
                 let (_, kernel) = kernel(azimuth, elevation, fineness);
                 let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new(&weighting(&kernel), (fineness, degree), &taps).of_a_mean();
+                let stated = SliceError::new(&weighting(&kernel), [fineness, degree], &taps).of_a_mean();
                 assert!(stated < most * error, "{fineness} {degree} at {azimuth}: {stated:e}");
             }
         }
@@ -280,13 +283,15 @@ mod tests {
 
     /// The sums of |E_i| and of E_i of an infinite slice, as shares of its sum of weights, straight from the definition.
     fn sums(
-        (shear, kernel): (&Shear, &Kernel),
-        (degree, taps): (usize, &[Taps; 2]),
+        shear: &Shear,
+        kernel: &Kernel,
+        degree: usize,
+        taps: &[Taps; 2],
         [slice, pixel]: [[f64; 2]; 2],
     ) -> [f64; 2] {
         let q = shear.fineness as f64;
         let splines = [0, 1].map(|i| filtered(degree, &taps[i], slice[i]));
-        let mut weights = Weights::of(kernel);
+        let mut weights = Weights::new(kernel);
         let (mut off, mut signed, mut all) = (0.0, 0.0, 0.0);
         for (n, m) in (-12..=12).flat_map(|n| (-12..=12).map(move |m| (f64::from(n), f64::from(m)))) {
             let at = [pixel[0] - n * q, pixel[1] - m * q];
@@ -314,11 +319,11 @@ mod tests {
             for (fineness, degree) in [(1, 5), (2, 3), (2, 4), (2, 5), (3, 4)] {
                 let (shear, kernel) = kernel(azimuth, elevation, fineness);
                 let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new(&weighting(&kernel), (fineness, degree), &taps);
+                let stated = SliceError::new(&weighting(&kernel), [fineness, degree], &taps);
                 let mut most = [0.0_f64; 2];
                 for n in 0..81_u32 {
                     let at = |i: u32| f64::from(n / 3_u32.pow(i) % 3) / 3.0;
-                    let [off, signed] = sums((&shear, &kernel), (degree, &taps), [[at(0), at(1)], [at(2), at(3)]]);
+                    let [off, signed] = sums(&shear, &kernel, degree, &taps, [[at(0), at(1)], [at(2), at(3)]]);
                     most = [most[0].max(off), most[1].max(signed.abs())];
                 }
                 assert!(

@@ -57,7 +57,7 @@ impl Kernel {
         let number = |i: usize, n: usize| n as f64 + 1.0 - half[i] as f64;
         let cross = |n: usize| (0..columns[0].padded).map(move |m| libm::exp(-uv * number(0, m) * number(1, n)) as f32);
         let cross = (0..2 * half[1]).flat_map(cross).collect();
-        let spans = (0..2 * half[1]).map(|n| span(inverse, radius, (half[0], number(1, n)))).collect();
+        let spans = (0..2 * half[1]).map(|n| span(inverse, radius, half[0], number(1, n))).collect();
         Some(Self { inverse, radius, half, columns, rows, cross, spans })
     }
 
@@ -140,7 +140,7 @@ fn gaussian([uu, uv, vv]: [f64; 3], [u, v]: [f64; 2]) -> f64 {
 }
 
 /// The cells of row `n` that are within the cut for some position of the pixel after a cell.
-fn span([uu, uv, vv]: [f64; 3], radius: f64, (half, n): (usize, f64)) -> Range<usize> {
+fn span([uu, uv, vv]: [f64; 3], radius: f64, half: usize, n: f64) -> Range<usize> {
     // The middle of the row, and half its width, for rows at a distance of n - t.
     let (slant, rest) = (uv / uu, vv - uv * uv / uu);
     let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
@@ -184,7 +184,7 @@ pub(super) struct Weights {
 
 impl Weights {
     /// Allocates the weights for a kernel.
-    pub(super) fn of(kernel: &Kernel) -> Self {
+    pub(super) fn new(kernel: &Kernel) -> Self {
         let (width, height) = (kernel.columns[0].padded, kernel.rows[0].padded);
         let (columns, across) = ([0, 1].map(|_| vec![0.0; width]), [0, 1].map(|_| vec![0.0; height]));
         let (rows, spans) = (vec![0.0; width * kernel.spans.len()], kernel.spans.clone());
@@ -259,7 +259,7 @@ mod tests {
         let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, 1);
         for sigma in [1e-3, 0.03, 0.1, 0.3, 1.0, 3.0] {
             let Some(kernel) = Kernel::new(&shear, sigma * 2.3, 3.5) else { continue };
-            let mut weights = Weights::of(&kernel);
+            let mut weights = Weights::new(&kernel);
             for position in [[0.0, 0.0], [0.4, 0.9], [0.99, 0.01]] {
                 kernel.weights(position, &mut weights);
                 let finite = |row: &[f32]| row.iter().all(|weight| weight.is_finite());
@@ -277,7 +277,7 @@ mod tests {
             let camera = Camera::new(&view, &grid).expect("a valid view");
             let shear = Shear::new(&camera, &grid, 2);
             let kernel = Kernel::new(&shear, sigma, 4.5).expect("a wide kernel");
-            let mut weights = Weights::of(&kernel);
+            let mut weights = Weights::new(&kernel);
             let (half, reach) = (kernel.half(), kernel.reach(&shear, sigma));
             for position in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {
                 kernel.weights(position, &mut weights);

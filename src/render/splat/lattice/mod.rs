@@ -41,9 +41,9 @@ pub(super) use error::SliceError;
 pub(in crate::render) use filtered::FilteredCells;
 pub(super) use gather::Gather;
 pub(in crate::render) use gather::Ones;
-pub(super) use picture::{Lattice, Volume};
+pub(super) use picture::{Lattice, SplattedView};
 pub(in crate::render) use shear::Shear;
-pub(super) use spread::{Placed, Work};
+pub(super) use spread::{Placed, SpreadScratch};
 
 /// How values are spread over the cells of a view.
 #[derive(Debug, Clone, Copy)]

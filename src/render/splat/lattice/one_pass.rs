@@ -15,7 +15,7 @@ pub(super) struct OnePass {
 
 impl OnePass {
     pub(super) fn new(kernel: &Kernel) -> Self {
-        Self { weights: (0..LANES).map(|_| Weights::of(kernel)).collect() }
+        Self { weights: (0..LANES).map(|_| Weights::new(kernel)).collect() }
     }
 
     /// Computes the weights of `count` pixels of a row.

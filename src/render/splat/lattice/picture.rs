@@ -2,7 +2,7 @@
 //! than footprints.
 
 use super::cells::{Cells, LINE, Rectangle};
-use super::error::{SliceError, Weighting};
+use super::error::{Choice, SliceError, Weighting};
 use super::filtered::{FilteredCells, Window, places, side_by_side};
 use super::kernel::Kernel;
 use super::prefilter::{self, HALF, Taps};
@@ -36,12 +36,36 @@ pub(in crate::render) struct Lattice {
 }
 
 /// A bound for a kernel, a choice, and its prefilters.
-type Bound = fn(&Weighting<'_>, (usize, usize), &[Taps; 2]) -> SliceError;
-/// A grid, the voxels of it that count, and its blocks.
-pub(in crate::render) type Volume<'a> = (&'a Grid, &'a Region, BlockGrid);
+type Bound = fn(&Weighting<'_>, Choice, &[Taps; 2]) -> SliceError;
+
+/// A view that may be splatted on a lattice.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct SplattedView<'a> {
+    pub(in crate::render) kernel: Gaussian,
+    pub(in crate::render) grid: &'a Grid,
+    /// The voxels that count.
+    pub(in crate::render) clip: &'a Region,
+    pub(in crate::render) blocks: BlockGrid,
+    pub(in crate::render) camera: &'a Camera,
+    /// What a voxel would add to pixels without a lattice.
+    pub(in crate::render) footprint: &'a Footprint,
+}
+
+impl SplattedView<'_> {
+    /// Standard deviation of the kernel in pixels.
+    fn sigma(&self) -> f64 {
+        self.kernel.sigma * self.camera.scale
+    }
+
+    /// Products for a plane with a footprint for each voxel.
+    fn footprint_work(&self) -> f64 {
+        let side = |pixels: usize| (2.0 * self.footprint.reach + 1.0).min(pixels as f64);
+        self.clip.voxels() as f64 * side(self.camera.size[0]) * side(self.camera.size[1])
+    }
+}
 
 /// Cells per voxel and degrees of splines, roughly from the cheapest on.
-const CHOICES: [(usize, usize); 8] = [(1, 3), (1, 4), (1, 5), (2, 3), (2, 4), (2, 5), (3, 4), (4, 5)];
+const CHOICES: [Choice; 8] = [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5], [3, 4], [4, 5]];
 /// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
 /// The largest number of cells that a square tile reaches.
@@ -54,17 +78,13 @@ impl Lattice {
     /// gives the error of the picture for the error of a slice.
     pub(in crate::render) fn within(
         error: f64,
-        gaussian: Gaussian,
-        volume: Volume<'_>,
-        camera: &Camera,
-        footprint: &Footprint,
+        view: &SplattedView<'_>,
         stated: impl Fn(SliceError) -> f64,
     ) -> Option<(Self, Method)> {
-        let (error, sigma) = (error.min(LARGEST), gaussian.sigma * camera.scale);
+        let error = error.min(LARGEST);
         let radius = (2.0 * libm::log(1.0 / (CUT * error))).sqrt();
         for choice in CHOICES.into_iter().filter(|_| error > LEAST) {
-            let lattice = Self::new(choice, (gaussian.tau, sigma, radius), volume, (camera, footprint));
-            let Some(lattice) = lattice else { continue };
+            let Some(lattice) = Self::new(choice, radius, view) else { continue };
             if stated(lattice.slice_error(SliceError::at_least)) > error {
                 continue;
             }
@@ -79,35 +99,29 @@ impl Lattice {
     /// The fastest lattice, whose error is only estimated: one cell a voxel. `estimated` gives the estimate for the
     /// picture from the error of a slice.
     pub(in crate::render) fn quick(
-        gaussian: Gaussian,
-        volume: Volume<'_>,
-        camera: &Camera,
-        footprint: &Footprint,
+        view: &SplattedView<'_>,
         estimated: impl Fn(SliceError) -> f64,
     ) -> Option<(Self, Method)> {
-        let (sigma, radius) = (gaussian.sigma * camera.scale, QUICK_RADIUS);
-        let lattice = Self::new(QUICK, (gaussian.tau, sigma, radius), volume, (camera, footprint))?;
+        let (lattice, radius) = (Self::new(QUICK, QUICK_RADIUS, view)?, QUICK_RADIUS);
         let stated_error = estimated(lattice.slice_error(SliceError::new));
         Some((lattice, Method { name: "lattice-fast", radius, stated_error }))
     }
 
-    /// The lattice with these cells per voxel and this degree; `None` if footprints are less work, or it does not suit.
-    fn new(
-        (fineness, degree): (usize, usize),
-        (tau, sigma, radius): (f64, f64, f64),
-        (grid, clip, blocks): Volume<'_>,
-        (camera, footprint): (&Camera, &Footprint),
-    ) -> Option<Self> {
+    /// The lattice of a choice, with a kernel that is cut at `radius` standard deviations; `None` if footprints are less
+    /// work, or it does not suit.
+    fn new([fineness, degree]: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
+        let sigma = view.sigma();
+        let SplattedView { grid, clip, blocks, camera, footprint, .. } = *view;
         let shear = Shear::new(camera, grid, fineness);
         let kernel = Kernel::new(&shear, sigma, radius)?;
-        let spreading = Spreading { shear, degree, tau };
+        let spreading = Spreading { shear, degree, tau: view.kernel.tau };
         let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
         let product = Product::new(&shear, sigma, radius);
         let reach = product.as_ref().map_or_else(|| kernel.reach(&shear, sigma), |product| product.reach(&shear));
         let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
         let additions = additions(clip, blocks, shear.axes[2]);
         let mut lattice = Self { spreading, kernel, product, taps, reach, peak, additions, bounds };
-        if !lattice.suits() || lattice.work(camera, clip) > footprint_work(camera, clip, footprint) {
+        if !lattice.suits() || lattice.work(camera, clip) > view.footprint_work() {
             return None;
         }
         lattice.bounds = lattice.filtered_rectangle(clip);
@@ -117,7 +131,7 @@ impl Lattice {
     /// The error of a slice, by one of the bounds.
     fn slice_error(&self, bound: Bound) -> SliceError {
         let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
-        let choice = (self.spreading.shear.fineness, self.spreading.degree);
+        let choice = [self.spreading.shear.fineness, self.spreading.degree];
         bound(&Weighting { kernel: &self.kernel, cut, additions: self.additions }, choice, &self.taps)
     }
 
@@ -283,7 +297,7 @@ impl Lattice {
 }
 
 /// The choice for a quick look, and the cut of its kernel in standard deviations.
-const QUICK: (usize, usize) = (1, 3);
+const QUICK: Choice = [1, 3];
 const QUICK_RADIUS: f64 = 3.5;
 /// The share of the error that is left for the cut of the kernel.
 const CUT: f64 = 0.03;
@@ -309,10 +323,4 @@ fn additions(clip: &Region, blocks: BlockGrid, axis: usize) -> usize {
 
 fn area([width, height]: [usize; 2]) -> usize {
     width * height
-}
-
-/// Products for a plane with a footprint for each voxel.
-fn footprint_work(camera: &Camera, clip: &Region, footprint: &Footprint) -> f64 {
-    let side = |pixels: usize| (2.0 * footprint.reach + 1.0).min(pixels as f64);
-    clip.voxels() as f64 * side(camera.size[0]) * side(camera.size[1])
 }

@@ -12,7 +12,7 @@ use super::shear::Shear;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
-use crate::render::plane_values::PlaneValues;
+use crate::render::batches::PlaneValues;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -53,7 +53,7 @@ struct Slice {
 
 /// Scratch for spreading a block.
 #[derive(Debug, Default)]
-pub(in crate::render) struct Work<R> {
+pub(in crate::render) struct SpreadScratch<R> {
     /// Rows of values times their fading, with zeros on both sides.
     faded: Vec<R>,
     /// The block's own cells.
@@ -78,7 +78,7 @@ impl Placed {
             _ => (0..count[i]).map(|n| libm::exp(-tau * shear.depths[i] * n as f64)).collect(),
         });
         let nearest = nearest_depth(shear, clip.start, count);
-        let slice = |k| Slice::new((clip.start, nearest), spreading, k, [count[0], count[1]], extent);
+        let slice = |k| Slice::new(clip.start, nearest, spreading, k, [count[0], count[1]], extent);
         let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         Self {
             spreading: *spreading,
@@ -96,11 +96,16 @@ impl Placed {
     }
 
     /// Adds values to a plane.
-    pub(in crate::render) fn add(&self, values: PlaneValues<'_>, plane: &mut CellPlane<'_>, work: &mut Work<f32>) {
+    pub(in crate::render) fn add(
+        &self,
+        values: PlaneValues<'_>,
+        plane: &mut CellPlane<'_>,
+        scratch: &mut SpreadScratch<f32>,
+    ) {
         match values {
             PlaneValues::Nothing => {}
-            PlaneValues::Single(values) => self.add_all(values, plane, work),
-            PlaneValues::Double(values) => self.add_all(values, plane, work),
+            PlaneValues::Single(values) => self.add_all(values, plane, scratch),
+            PlaneValues::Double(values) => self.add_all(values, plane, scratch),
             PlaneValues::Few(values) => {
                 values.iter().for_each(|(voxel, value)| self.add_one(*voxel, *value, plane));
             }
@@ -108,38 +113,41 @@ impl Placed {
     }
 
     /// Adds dense values through the block's own cells, which stay in the second-level cache.
-    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, work: &mut Work<f32>) {
+    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, scratch: &mut SpreadScratch<f32>) {
         let values = BlockValues::new(values);
         if values.middle != 0.0 {
             let ones = self.ones.get_or_init(|| self.spread_ones());
             plane.add_double(&self.rectangle, ones, values.middle * self.nearest);
         }
         if values.scale != 0.0 {
-            let (sums, scale) = (self.spread(&values, work), values.scale * self.nearest);
+            let (sums, scale) = (self.spread(&values, scratch), values.scale * self.nearest);
             if values.scale == 1.0 && fits_single(values.largest * self.nearest) {
                 plane.add_single(&self.rectangle, &sums, scale as f32);
             } else {
                 plane.add_double(&self.rectangle, &sums, scale);
             }
-            work.sums = sums;
+            scratch.sums = sums;
         }
     }
 
     /// The cells of the value 1 at all voxels, in f64.
     fn spread_ones(&self) -> Aligned<f64> {
         let ones = vec![1.0; self.region.voxels()];
-        self.spread(&BlockValues { values: &ones, middle: 0.0, scale: 1.0, largest: 1.0 }, &mut Work::default())
+        self.spread(
+            &BlockValues { values: &ones, middle: 0.0, scale: 1.0, largest: 1.0 },
+            &mut SpreadScratch::default(),
+        )
     }
 
     /// The block's own cells.
-    fn spread<R: Real, S: Real>(&self, values: &BlockValues<'_, R>, work: &mut Work<S>) -> Aligned<S> {
+    fn spread<R: Real, S: Real>(&self, values: &BlockValues<'_, R>, scratch: &mut SpreadScratch<S>) -> Aligned<S> {
         let area = self.rectangle.area();
-        let mut sums = std::mem::take(&mut work.sums);
+        let mut sums = std::mem::take(&mut scratch.sums);
         if sums.len() != area {
             sums = sums.resized(area);
         }
         sums.fill(S::default());
-        add_block(self, values, &mut sums, work);
+        add_block(self, values, &mut sums, scratch);
         sums
     }
 
@@ -170,7 +178,8 @@ impl Placed {
 impl Slice {
     /// The `k`-th slice, of `count` voxels along b and c from `start` on.
     fn new(
-        (start, nearest): ([usize; 3], f64),
+        start: [usize; 3],
+        nearest: f64,
         spreading: &Spreading,
         k: usize,
         count: [usize; 2],
@@ -206,15 +215,20 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_block<R: Real, S: Real>(placed: &Placed, values: &BlockValues<'_, R>, sums: &mut [S], work: &mut Work<S>) {
+fn add_block<R: Real, S: Real>(
+    placed: &Placed,
+    values: &BlockValues<'_, R>,
+    sums: &mut [S],
+    scratch: &mut SpreadScratch<S>,
+) {
     let Spreading { shear, degree, .. } = &placed.spreading;
     match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
-        (1, ..=4) => add_slices::<R, S, 1, 4>(placed, values, sums, work),
-        (1, _) => add_slices::<R, S, 1, 6>(placed, values, sums, work),
-        (2, ..=2) => add_slices::<R, S, 2, 2>(placed, values, sums, work),
-        (2, _) => add_slices::<R, S, 2, 3>(placed, values, sums, work),
-        (3, _) => add_slices::<R, S, 3, 2>(placed, values, sums, work),
-        (_, _) => add_slices::<R, S, 4, 2>(placed, values, sums, work),
+        (1, ..=4) => add_slices::<R, S, 1, 4>(placed, values, sums, scratch),
+        (1, _) => add_slices::<R, S, 1, 6>(placed, values, sums, scratch),
+        (2, ..=2) => add_slices::<R, S, 2, 2>(placed, values, sums, scratch),
+        (2, _) => add_slices::<R, S, 2, 3>(placed, values, sums, scratch),
+        (3, _) => add_slices::<R, S, 3, 2>(placed, values, sums, scratch),
+        (_, _) => add_slices::<R, S, 4, 2>(placed, values, sums, scratch),
     }
 }
 
@@ -224,9 +238,9 @@ fn add_slices<R: Real, S: Real, const Q: usize, const TAPS: usize>(
     placed: &Placed,
     values: &BlockValues<'_, R>,
     sums: &mut [S],
-    work: &mut Work<S>,
+    scratch: &mut SpreadScratch<S>,
 ) {
-    work.clear(placed, TAPS);
+    scratch.clear(placed, TAPS);
     for first in (0..placed.count[1]).step_by(ROWS) {
         let rows = first..placed.count[1].min(first + ROWS);
         for (k, slice) in placed.slices.iter().enumerate() {
@@ -234,10 +248,10 @@ fn add_slices<R: Real, S: Real, const Q: usize, const TAPS: usize>(
             if rows.is_empty() {
                 continue;
             }
-            let (live, voxels) = (fade_rows(placed, (k, values), &rows, work), &slice.voxels[0]);
+            let (live, voxels) = (fade_rows(placed, k, values, &rows, scratch), &slice.voxels[0]);
             let live = live.start.max(voxels.start / LINE)..live.end.min(voxels.end.div_ceil(LINE));
             if !live.is_empty() {
-                add_rows::<S, Q, TAPS>((slice, &placed.rectangle), (&rows, &live), work, sums);
+                add_rows::<S, Q, TAPS>(slice, &placed.rectangle, &rows, &live, scratch, sums);
             }
         }
     }
@@ -246,7 +260,7 @@ fn add_slices<R: Real, S: Real, const Q: usize, const TAPS: usize>(
 /// Number of rows that are taken through all slices together: the cells that they reach stay in the first-level cache.
 const ROWS: usize = 32;
 
-impl<S: Real> Work<S> {
+impl<S: Real> SpreadScratch<S> {
     fn clear(&mut self, placed: &Placed, taps: usize) {
         self.before = LINE - 1 + taps - 1;
         self.lines = (self.before + placed.count[0]).div_ceil(LINE);
@@ -262,15 +276,16 @@ impl<S: Real> Work<S> {
 #[inline(always)]
 fn fade_rows<R: Real, S: Real>(
     placed: &Placed,
-    (k, values): (usize, &BlockValues<'_, R>),
+    k: usize,
+    values: &BlockValues<'_, R>,
     rows: &Range<usize>,
-    work: &mut Work<S>,
+    scratch: &mut SpreadScratch<S>,
 ) -> Range<usize> {
     let ([width, ..], [along, across, slices]) = (placed.count, placed.steps);
     let mut live = 0;
-    let (faded, behind) = work.faded.split_at_mut(rows.len() * work.width);
-    for (c, row) in rows.clone().zip(faded.chunks_exact_mut(work.width)) {
-        let row = &mut row[work.before..][..width];
+    let (faded, behind) = scratch.faded.split_at_mut(rows.len() * scratch.width);
+    for (c, row) in rows.clone().zip(faded.chunks_exact_mut(scratch.width)) {
+        let row = &mut row[scratch.before..][..width];
         values.load_row(placed.first + k * slices + c * across, along, row);
         if let [_, ..] = placed.fading[0][..] {
             fade(row, placed.fading[1][c], &placed.fading[0]);
@@ -306,20 +321,22 @@ fn live_lines<S: Real>(row: &[S]) -> u64 {
 /// the values spread along u stay in registers for all rows of cells that they reach.
 #[inline(always)]
 fn add_rows<S: Real, const Q: usize, const TAPS: usize>(
-    (slice, rectangle): (&Slice, &Rectangle),
-    (rows, live): (&Range<usize>, &Range<usize>),
-    work: &Work<S>,
+    slice: &Slice,
+    rectangle: &Rectangle,
+    rows: &Range<usize>,
+    live: &Range<usize>,
+    scratch: &SpreadScratch<S>,
     sums: &mut [S],
 ) {
     let across = by_phase::<S, Q, TAPS>(&slice.across);
     let top = (slice.cell[1] - rectangle.first[1]) as usize + rows.start * Q;
     for (phase, along) in by_phase::<S, Q, TAPS>(&slice.along).into_iter().enumerate() {
-        let run = rectangle.run_of(slice.cell[0] + phase as isize, work.lines);
+        let run = rectangle.run_of(slice.cell[0] + phase as isize, scratch.lines);
         let reached = live.start..live.end + (run.inside + TAPS - 2) / LINE + 1;
         for n in reached.start.max(run.here.start)..reached.end.min(run.here.end) {
             let column = run.start + (n - run.here.start) * LINE;
-            let from = n * LINE + work.before - run.inside + 1 - TAPS;
-            let faded = work.faded[from..].chunks(work.width).take(rows.len() + TAPS - 1);
+            let from = n * LINE + scratch.before - run.inside + 1 - TAPS;
+            let faded = scratch.faded[from..].chunks(scratch.width).take(rows.len() + TAPS - 1);
             let mut sums = sums[top * rectangle.size[0] + column..].chunks_mut(rectangle.size[0]);
             let mut window = [[S::default(); LINE]; TAPS];
             for row in faded {

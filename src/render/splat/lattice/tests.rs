@@ -4,7 +4,7 @@ use super::cells::Rectangle;
 use super::spline::spread;
 use super::*;
 use crate::base::grid::{Grid, Region};
-use crate::render::plane_values::PlaneValues;
+use crate::render::batches::PlaneValues;
 use crate::view::camera::{Camera, View};
 use std::collections::BTreeMap;
 
@@ -98,7 +98,7 @@ fn slices_spread_like_single_values() {
         let few: Vec<(u32, f64)> = (0..).zip(values.iter().copied()).filter(|(_, v)| *v != 0.0).collect();
         let ways =
             [PlaneValues::Double(&values), PlaneValues::Single(&single), PlaneValues::Few(&few), PlaneValues::Nothing];
-        let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), Work::default());
+        let (mut planes, mut work) = (Cells::new(rectangle, ways.len()), SpreadScratch::default());
         let room = DoubleRoom::new(ways.len() + 1);
         let into = planes.planes_mut(&room).into_iter().zip(ways);
         into.for_each(|(mut plane, values)| placed.add(values, &mut plane, &mut work));

@@ -61,15 +61,11 @@ impl<'a> TwoPasses<'a> {
         let columns = (self.tile.first[0]..).zip(&mut self.top).zip(self.across.chunks_exact_mut(across.padded()));
         columns.for_each(|((u, top), weights)| *top = across.weights(crossing + u as f64 * per_column, weights));
         let first = self.tile.first[0];
-        let weights = (&self.top[..], &self.across[..], across.cells);
-        self.single
-            .iter_mut()
-            .zip(&bundles.single)
-            .for_each(|(sums, bundle)| sum_columns(bundle, first, weights, sums));
-        self.double
-            .iter_mut()
-            .zip(&bundles.double)
-            .for_each(|(sums, bundle)| sum_columns(bundle, first, weights, sums));
+        let columns = Columns { first, top: &self.top, weights: &self.across, cells: across.cells };
+        let single = self.single.iter_mut().zip(&bundles.single);
+        single.for_each(|(sums, bundle)| sum_columns(bundle, &columns, sums));
+        let double = self.double.iter_mut().zip(&bundles.double);
+        double.for_each(|(sums, bundle)| sum_columns(bundle, &columns, sums));
     }
 
     /// The sums at neighbouring pixels of the row, from x on, in every bundle.
@@ -86,30 +82,23 @@ impl<'a> TwoPasses<'a> {
         let (n, along, places) = (x - self.x.start, &self.product.along, columns.len() / self.tile.size[0]);
         let first = &self.first[n..][..sums.len()];
         let weights = &self.weights[n * along.padded()..][..sums.len() * along.padded()];
-        add_pixels(columns, places, (first, weights, along.cells), sums);
+        add_pixels(columns, places, &PixelColumns { first, weights, cells: along.cells }, sums);
     }
 }
 
-/// Sums the columns from `first` on. `top`, `weights` and `cells` give the first row of each, the padded weights of each,
-/// and how many cells have one.
-fn sum_columns<R: Real>(
-    bundle: &Bundle<'_, R>,
-    first: isize,
-    (top, weights, cells): (&[isize], &[f32], usize),
-    sums: &mut [R],
-) {
-    let columns = Columns { first, top, weights, cells };
+fn sum_columns<R: Real>(bundle: &Bundle<'_, R>, columns: &Columns<'_>, sums: &mut [R]) {
     match bundle.places {
-        1 => add_columns::<R, 1>(bundle, &columns, sums),
-        2 => add_columns::<R, 2>(bundle, &columns, sums),
-        4 => add_columns::<R, 4>(bundle, &columns, sums),
-        8 => add_columns::<R, 8>(bundle, &columns, sums),
-        _ => add_columns::<R, TOGETHER>(bundle, &columns, sums),
+        1 => add_columns::<R, 1>(bundle, columns, sums),
+        2 => add_columns::<R, 2>(bundle, columns, sums),
+        4 => add_columns::<R, 4>(bundle, columns, sums),
+        8 => add_columns::<R, 8>(bundle, columns, sums),
+        _ => add_columns::<R, TOGETHER>(bundle, columns, sums),
     }
 }
 
-/// Columns of cells.
+/// Columns of cells to sum.
 struct Columns<'a> {
+    /// The number of the first one.
     first: isize,
     /// The first row with a weight in each column, and the padded weights.
     top: &'a [isize],
@@ -135,8 +124,17 @@ fn add_columns<R: Real, const N: usize>(bundle: &Bundle<'_, R>, columns: &Column
     }
 }
 
-/// Sums the columns of neighbouring pixels: the first one of each, its padded weights, and how many cells have one.
-fn add_pixels<R: Real>(columns: &[R], places: usize, pixels: (&[usize], &[f32], usize), sums: &mut [[R; TOGETHER]]) {
+/// The columns of neighbouring pixels.
+struct PixelColumns<'a> {
+    /// The first column of each pixel, and its padded weights.
+    first: &'a [usize],
+    weights: &'a [f32],
+    /// Columns with a weight.
+    cells: usize,
+}
+
+/// Sums the columns of neighbouring pixels.
+fn add_pixels<R: Real>(columns: &[R], places: usize, pixels: &PixelColumns<'_>, sums: &mut [[R; TOGETHER]]) {
     match places {
         1 => add_rows::<R, 1>(columns, pixels, sums),
         2 => add_rows::<R, 2>(columns, pixels, sums),
@@ -147,11 +145,8 @@ fn add_pixels<R: Real>(columns: &[R], places: usize, pixels: (&[usize], &[f32], 
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn add_rows<R: Real, const N: usize>(
-    columns: &[R],
-    (first, weights, cells): (&[usize], &[f32], usize),
-    sums: &mut [[R; TOGETHER]],
-) {
+fn add_rows<R: Real, const N: usize>(columns: &[R], pixels: &PixelColumns<'_>, sums: &mut [[R; TOGETHER]]) {
+    let PixelColumns { first, weights, cells } = *pixels;
     let columns = columns.as_chunks::<N>().0;
     let pixels = first.iter().zip(weights.chunks_exact(weights.len() / first.len()));
     for (sums, (first, weights)) in sums.iter_mut().zip(pixels) {

@@ -42,10 +42,10 @@ impl Layout {
 
     /// The frame of a plane of values or of missing weights, and whether it holds missing weights; `None` for other
     /// planes.
-    pub(super) fn samples(&self, plane: usize) -> Option<(usize, bool)> {
-        let of = |first: usize, there: bool| plane.checked_sub(first).filter(|f| there && *f < self.frames);
-        let absent = || of(self.absent(0), self.absent).map(|f| (f, true));
-        of(self.value(0), self.values).map(|f| (f, false)).or_else(absent)
+    pub(in crate::render) fn samples(&self, plane: usize) -> Option<(usize, bool)> {
+        let frame = |first: usize, there: bool| plane.checked_sub(first).filter(|f| there && *f < self.frames);
+        let absent = || frame(self.absent(0), self.absent).map(|f| (f, true));
+        frame(self.value(0), self.values).map(|f| (f, false)).or_else(absent)
     }
 
     /// The index of the plane of weights missing in all frames.

@@ -3,16 +3,14 @@
 //! The number of views and frames rendered together, the rows of a band and the blocks decoded together do not change
 //! any pixel.
 
-use super::config::RenderConfig;
-use super::layout::Layout;
-use super::scene::Scene;
-use super::splat::footprints::Splats;
-use super::splat::sparse_terms::SparseTerms;
-use super::splat::tile_rect::TILE;
-use super::splat::{DoubleRoom, ViewSetup};
-use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::memory;
+use crate::render::batches::{Layout, Scene, in_batch};
+use crate::render::config::RenderConfig;
+use crate::render::splat::footprints::Splats;
+use crate::render::splat::sparse_terms::SparseTerms;
+use crate::render::splat::tile_rect::TILE;
+use crate::render::splat::{DoubleRoom, ViewSetup};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -76,32 +74,18 @@ const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
 
 impl<'a> Budget<'a> {
     /// The least memory in bytes with which each view can be rendered alone.
-    pub(super) fn least((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &[ViewSetup]) -> usize {
+    pub(super) fn least(config: &RenderConfig, kept: Kept, scene: &dyn Scene, setups: &[ViewSetup]) -> usize {
         let planes = scene.most_planes(1, config);
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
-            let budget = Budget::new((config, kept), scene, setups);
-            budget.fixed + budget.bytes(1, budget.all_double(planes), TILE)
+            let budget = Budget::new(config, kept, scene, setups);
+            budget.fixed + budget.bytes(1, budget.all_double(planes), TILE, 1)
         };
         setups.iter().map(least).max().unwrap_or(0)
     }
 
-    /// An error unless the settings allow `least` bytes.
-    pub(super) fn check(config: &RenderConfig, least: usize) -> Result<()> {
-        if least <= config.memory {
-            return Ok(());
-        }
-        let ([width, height], mib) = (config.size(), least.div_ceil(1 << 20));
-        let threads = rayon::current_num_threads();
-        let pictures = format!("pictures of {width}x{height} pixels of this volume");
-        Err(Error::setting(
-            "memory",
-            format!("{pictures} need at least {mib}MiB with {threads} thread(s), without the memory of the sink"),
-        ))
-    }
-
     /// The budget for pictures from these views.
-    fn new((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
+    fn new(config: &RenderConfig, kept: Kept, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let [of_a_view, together] = kept.bytes(scene.channels(), config);
         let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view);
         let fixed = fixed(config, setups);
@@ -113,24 +97,19 @@ impl<'a> Budget<'a> {
 
     /// The budget for as many of the first views as fit together: whole pictures of all views, and as many frames at a
     /// time as the first view has alone. One view if the selection of blocks depends on the view.
-    pub(super) fn of_most((config, kept): (&RenderConfig, Kept), scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
-        let most = if config.chooses_by_view() { 1 } else { setups.len() };
-        Self::of_first((config, kept), scene, &setups[..most], config.size()[1])
-    }
-
-    /// The budget for as many of the first views as fit together with `rows` rows of all pictures.
-    fn of_first(
-        (config, kept): (&RenderConfig, Kept),
+    pub(super) fn for_most_views(
+        config: &RenderConfig,
+        kept: Kept,
         scene: &dyn Scene,
         setups: &'a [ViewSetup],
-        rows: usize,
     ) -> Self {
-        let alone = Self::new((config, kept), scene, &setups[..1]);
+        let (rows, alone) = (config.size()[1], Self::new(config, kept, scene, &setups[..1]));
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = scene.most_planes(frames, config);
         let fits = |budget: &Self| budget.fits(frames, budget.planes(planes), rows);
-        let several = |count: usize| Some(Self::new((config, kept), scene, &setups[..count])).filter(fits);
-        let (mut best, mut least, mut most) = (alone, 1, setups.len());
+        let several = |count: usize| Some(Self::new(config, kept, scene, &setups[..count])).filter(fits);
+        let (mut best, mut least) = (alone, 1);
+        let mut most = if config.chooses_by_view() { 1 } else { setups.len() };
         while least < most {
             let middle = least.midpoint(most + 1);
             match several(middle) {
@@ -144,6 +123,11 @@ impl<'a> Budget<'a> {
     /// The views.
     pub(super) fn setups(&self) -> &'a [ViewSetup] {
         self.setups
+    }
+
+    /// Width and height of a picture.
+    pub(super) fn size(&self) -> [usize; 2] {
+        self.size
     }
 
     /// Pixels of a picture.
@@ -161,14 +145,16 @@ impl<'a> Budget<'a> {
         Planes { all, doubles: all * self.setups.len() }
     }
 
-    /// Bytes of the pictures of `frames` frames, bands of `rows` rows, and one block.
-    fn bytes(&self, frames: usize, planes: Planes, rows: usize) -> usize {
-        self.picture_bytes(frames) + self.band_bytes(planes, rows) + self.block_bytes(planes.all)
+    /// Bytes of the pictures of `frames` frames, bands of `rows` rows, and some blocks.
+    fn bytes(&self, frames: usize, planes: Planes, rows: usize, blocks: usize) -> usize {
+        self.picture_bytes(frames) + self.band_bytes(planes, rows) + blocks * self.block_bytes(planes.all)
     }
 
-    /// Whether [`Self::bytes`] fit; and also the lowest band, should all planes need sums in f64.
+    /// Whether [`Self::bytes`] fit with one block; and also the lowest band, should all planes need sums in f64.
     fn fits(&self, frames: usize, planes: Planes, rows: usize) -> bool {
-        self.bytes(frames, planes, rows).max(self.bytes(frames, self.all_double(planes.all), TILE)) <= self.available
+        let (bytes, lowest) =
+            (self.bytes(frames, planes, rows, 1), self.bytes(frames, self.all_double(planes.all), TILE, 1));
+        bytes.max(lowest) <= self.available
     }
 
     /// Bytes of a block, with its sparse terms and their projections in each view that takes footprints, and its cells of
@@ -220,19 +206,13 @@ impl<'a> Budget<'a> {
 
     /// The plan of a band of these rows.
     pub(super) fn plan(&self, layout: &Layout, rows: Range<usize>) -> BandPlan {
-        let blocks = self.batch(layout, rows.len());
-        let used = self.used(layout, rows.len(), blocks, 0);
-        let planes = self.all_double(layout.planes());
+        let (blocks, all) = (self.blocks_at_a_time(layout, rows.len()), layout.planes());
+        let used = self.bytes(layout.frames, Planes { all, doubles: 0 }, rows.len(), blocks);
         let left = self.available.saturating_sub(used) / self.double_bytes(rows.len()).max(1);
         // The lowest band fits with all planes in f64.
-        let most = if rows.len() <= TILE { planes.doubles } else { left.min(planes.doubles) };
+        let doubles = self.all_double(all).doubles;
+        let most = if rows.len() <= TILE { doubles } else { left.min(doubles) };
         BandPlan { rows, blocks, room: DoubleRoom::new(most) }
-    }
-
-    /// Bytes for a band of `rows` rows, with some blocks decoded at a time and some planes in f64.
-    fn used(&self, layout: &Layout, rows: usize, blocks: usize, doubles: usize) -> usize {
-        let planes = Planes { all: layout.planes(), doubles };
-        self.picture_bytes(layout.frames) + self.band_bytes(planes, rows) + blocks * self.block_bytes(planes.all)
     }
 
     /// Learns from a splatted band how many planes need sums in f64. If it had too little room, it shows only some of
@@ -244,14 +224,15 @@ impl<'a> Budget<'a> {
 
     /// Bytes that a splatted band had, with all that does not depend on bands.
     pub(super) fn granted_bytes(&self, layout: &Layout, band: &BandPlan) -> usize {
-        self.fixed + self.used(layout, band.rows.len(), band.blocks, band.room.granted())
+        let planes = Planes { all: layout.planes(), doubles: band.room.granted() };
+        self.fixed + self.bytes(layout.frames, planes, band.rows.len(), band.blocks)
     }
 
     /// How many blocks to decode at a time while a band of `rows` is splatted.
-    fn batch(&self, layout: &Layout, rows: usize) -> usize {
+    fn blocks_at_a_time(&self, layout: &Layout, rows: usize) -> usize {
         let all = layout.planes();
         let planes = if rows <= TILE { self.all_double(all) } else { self.planes(all) };
-        let used = self.used(layout, rows, 0, planes.doubles);
+        let used = self.bytes(layout.frames, planes, rows, 0);
         // The lattice reads its blocks plane by plane, so few blocks stay in the caches.
         let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()
@@ -280,10 +261,4 @@ fn most_frames(scene: &dyn Scene, mut frames: &[usize]) -> usize {
         (most, frames) = (most.max(batch.len()), later);
     }
     most
-}
-
-/// How many of `frames` belong to the same batch as the first.
-pub(super) fn in_batch(scene: &dyn Scene, first: usize, frames: &[usize]) -> usize {
-    let end = scene.batch_end(first);
-    frames.partition_point(|f| *f < end)
 }

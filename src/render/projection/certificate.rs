@@ -18,11 +18,11 @@
 //! `weight_rounding`, and the inverse transform by `INVERSE`. A mean is off by the rounding of its emission, and by
 //! the rounding of its weights times itself.
 
-use super::config::Quantity;
-use super::scene::FrameBounds;
-use super::splat::ViewSetup;
-use super::weights::PixelWeight;
+use super::weight_sums::PixelWeight;
 use crate::base::sample::magnitude;
+use crate::render::batches::FrameBounds;
+use crate::render::config::Quantity;
+use crate::render::splat::ViewSetup;
 use crate::view::footprint::Method;
 
 /// The rounding of the inverse transform, as a share of the sum of absolute terms. It has at most ten levels of up to

@@ -15,15 +15,16 @@
 //! everything is multiplied by W^2. The estimate spreads a block's errors evenly over its voxels and treats missing
 //! samples as present.
 
-use super::config::{Quantity, RenderConfig};
-use super::weights::WeightedView;
 use crate::base::grid::{Grid, Region};
+use crate::render::config::{Quantity, RenderConfig};
+use crate::view::camera::Camera;
+use crate::view::footprint::Footprint;
 use std::f64::consts::PI;
 
 /// A view in which errors are estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Expectation<'a> {
-    weighted: &'a WeightedView<'a>,
+    view: ViewWeights<'a>,
     quantity: Quantity,
     /// Number of pixels that are not background.
     pixels: f64,
@@ -33,9 +34,39 @@ pub struct Expectation<'a> {
     area: f64,
 }
 
+/// The voxels of a view, and the sums of their weights in its pixels.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct ViewWeights<'a> {
+    pub(in crate::render) camera: &'a Camera,
+    pub(in crate::render) footprint: &'a Footprint,
+    pub(in crate::render) grid: &'a Grid,
+    /// The voxels that are splatted.
+    pub(in crate::render) clip: Region,
+    pub(in crate::render) sums: &'a [f64],
+    /// Pixels with a smaller sum are background.
+    pub(in crate::render) threshold: f64,
+}
+
+impl ViewWeights<'_> {
+    /// The sums of the pixels that are not background.
+    fn shown(&self) -> impl Iterator<Item = f64> {
+        self.sums.iter().copied().filter(|sum| *sum >= self.threshold)
+    }
+
+    /// The sum at a point of the picture, or of the nearest pixel for points within reach of a footprint outside; at least
+    /// the background threshold. `None` for other points.
+    fn near(&self, point: [f64; 2]) -> Option<f64> {
+        let (reach, size) = (self.footprint.reach, self.camera.size);
+        let within = |a: usize| point[a] >= -reach && point[a] < size[a] as f64 + reach;
+        let pixel = |a: usize| (point[a].max(0.0) as usize).min(size[a] - 1);
+        let is_visible = within(0) && within(1) && self.threshold > 0.0;
+        is_visible.then(|| self.sums[pixel(1) * size[0] + pixel(0)].max(self.threshold))
+    }
+}
+
 /// The mean square over pixels of the error that a block causes if the mean square error of its samples is 1.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct BlockInfluence {
+pub(in crate::render) struct BlockInfluence {
     /// For equal errors of all voxels.
     together: f64,
     /// For independent errors.
@@ -44,37 +75,36 @@ pub(super) struct BlockInfluence {
 
 impl BlockInfluence {
     /// For equal errors of `alike` voxels each (F of eq 27).
-    pub(super) fn of(&self, alike: f64) -> f64 {
+    pub(in crate::render) fn for_alike(&self, alike: f64) -> f64 {
         if alike.is_finite() { (alike * self.apart).min(self.together) } else { self.together }
     }
 
     /// Whether the block influences no pixel.
-    pub(super) fn is_nothing(&self) -> bool {
+    pub(in crate::render) fn is_nothing(&self) -> bool {
         self.together == 0.0
     }
 }
 
 impl<'a> Expectation<'a> {
-    pub(super) fn new(weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
+    pub(in crate::render) fn new(view: ViewWeights<'a>, quantity: Quantity) -> Self {
         let (mut pixels, mut squares) = (0.0, 0.0);
-        for sum in weighted.weights.shown() {
+        for sum in view.shown() {
             pixels += 1.0;
             squares += sum * sum;
         }
         let pixels: f64 = if pixels > 0.0 { pixels } else { 1.0 };
-        let unit = if config.quantity == Quantity::Mean { 1.0 } else { squares / pixels };
-        let area = weighted.setup.footprint.area();
-        Self { weighted, quantity: config.quantity, pixels, unit, area }
+        let unit = if quantity == Quantity::Mean { 1.0 } else { squares / pixels };
+        Self { area: view.footprint.area(), view, quantity, pixels, unit }
     }
 
     /// The mean square error over pixels if every sample has the error `error`.
-    pub(super) fn allowed(&self, error: f64) -> f64 {
+    pub(in crate::render) fn allowed(&self, error: f64) -> f64 {
         error * error * self.unit
     }
 
     /// The influence of the block at `region`.
-    pub(super) fn of_block(&self, region: &Region) -> BlockInfluence {
-        let clip = region.intersect(&self.weighted.setup.clip);
+    pub(in crate::render) fn of_block(&self, region: &Region) -> BlockInfluence {
+        let clip = region.intersect(&self.view.clip);
         let mut sum = BlockInfluence::default();
         let mut points = 0.0;
         for voxel in spread(&clip) {
@@ -89,10 +119,10 @@ impl<'a> Expectation<'a> {
 
     /// Eq 27 for one voxel, summed over pixels.
     fn of_voxel(&self, voxel: [usize; 3]) -> BlockInfluence {
-        let WeightedView { setup, weights } = self.weighted;
-        let [x, y, z] = setup.camera.project(setup.grid.position(voxel));
-        let Some(sum) = weights.near([x, y], setup.footprint.reach) else { return BlockInfluence::default() };
-        let weight = setup.footprint.at_depth(z);
+        let ViewWeights { camera, footprint, grid, .. } = self.view;
+        let [x, y, z] = camera.project(grid.position(voxel));
+        let Some(sum) = self.view.near([x, y]) else { return BlockInfluence::default() };
+        let weight = footprint.at_depth(z);
         let unit = if self.quantity == Quantity::Mean { 1.0 } else { sum * sum };
         let together = self.area * weight / sum * unit;
         BlockInfluence { together, apart: together * (0.5 * weight / sum) }
@@ -100,7 +130,7 @@ impl<'a> Expectation<'a> {
 }
 
 /// F for boxes of `side` voxels: the number of voxels that count as one (eq 27). It is the same for all views.
-pub(super) fn alike(config: &RenderConfig, grid: &Grid, side: f64) -> f64 {
+pub(in crate::render) fn alike(config: &RenderConfig, grid: &Grid, side: f64) -> f64 {
     let footprint = footprint(config, grid);
     let across = (1.0 + footprint) / (1.0 + footprint / (side * side));
     side * across

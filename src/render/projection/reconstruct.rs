@@ -2,11 +2,10 @@
 //! weights (eq 12).
 
 use super::certificate::Certificate;
-use super::config::{Quantity, RenderConfig};
-use super::layout::Layout;
-use super::scene::{FrameBatch, Inverse};
-use super::splat::{Pixels, ResolvedTile};
-use super::weights::{PixelWeight, WeightedView, Weights};
+use super::weight_sums::{PixelWeight, WeightSums};
+use crate::render::batches::{FrameBatch, Inverse, Layout};
+use crate::render::config::{Quantity, RenderConfig};
+use crate::render::splat::{Pixels, ResolvedTile};
 use crate::wavelet::{LANES, Lane};
 
 /// Turns the planes of a batch into pixels.
@@ -14,15 +13,15 @@ pub(super) struct PixelReconstructor<'a> {
     batch: &'a dyn FrameBatch,
     layout: Layout,
     quantity: Quantity,
-    weights: &'a Weights,
+    weights: &'a WeightSums<'a>,
     certificate: Option<Certificate>,
 }
 
 impl<'a> PixelReconstructor<'a> {
     /// The reconstructor for the pictures of a view.
-    pub(super) fn new(batch: &'a dyn FrameBatch, weighted: &'a WeightedView<'a>, config: &RenderConfig) -> Self {
-        let certificate = config.certify.then(|| Certificate::new(weighted.setup, config.quantity));
-        Self { batch, layout: batch.layout(), quantity: config.quantity, weights: &weighted.weights, certificate }
+    pub(super) fn new(batch: &'a dyn FrameBatch, weights: &'a WeightSums<'a>, config: &RenderConfig) -> Self {
+        let certificate = config.certify.then(|| Certificate::new(weights.setup, config.quantity));
+        Self { batch, layout: batch.layout(), quantity: config.quantity, weights, certificate }
     }
 
     /// Number of pictures of a tile: one for each frame, and one more for its error bounds if pictures are certified.
@@ -40,7 +39,7 @@ impl<'a> PixelReconstructor<'a> {
             for first in (0..width).step_by(LANES) {
                 let count = LANES.min(width - first);
                 let x = tile.rect.x.start + first;
-                let weights = Lanes::of(self.weights, [x, y], count);
+                let weights = Lanes::new(self.weights, [x, y], count);
                 if self.quantity == Quantity::Mean && weights.are_background() {
                     continue;
                 }
@@ -70,7 +69,7 @@ impl<'a> PixelReconstructor<'a> {
         for (f, emission) in frames.iter().enumerate() {
             let (absent, errors) = sums.get(f).copied().unwrap_or_default();
             let present = if self.layout.absent { weights.present(&absent) } else { all };
-            let values = std::array::from_fn(|l| self.quantity.of(emission[l], present[l]));
+            let values = std::array::from_fn(|l| self.quantity.pixel(emission[l], present[l]));
             put(f, values);
             if let Some(certificate) = self.certificate {
                 let bounds = &self.batch.errors().frames[f];
@@ -93,7 +92,7 @@ impl<'a> PixelReconstructor<'a> {
 
 impl Quantity {
     /// The value of a pixel: its emission, or its mean (eq 12) with the weights that are present.
-    fn of(self, emission: f64, present: f64) -> f64 {
+    fn pixel(self, emission: f64, present: f64) -> f64 {
         match self {
             Self::Mean => emission / present,
             Self::Emission => emission,
@@ -113,11 +112,11 @@ impl Layout {
 }
 
 /// Keeps the sums of pixels as they are, so that those of other voxels can be added.
-pub(super) struct SumKeeper<'a> {
+pub(super) struct PartialSumKeeper<'a> {
     pub(super) batch: &'a dyn FrameBatch,
 }
 
-impl SumKeeper<'_> {
+impl PartialSumKeeper<'_> {
     /// Stores the emissions of all frames, then their missing weights if there are any. Leaves tiles without sums unchanged.
     pub(super) fn tile(&self, mut tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>) {
         let (used, layout) = (tile.used(), self.batch.layout());
@@ -143,15 +142,16 @@ impl SumKeeper<'_> {
 }
 
 /// The pixels of a picture whose sums are complete: emissions, and missing weights unless all samples are there.
-pub(super) fn finished(
+pub(in crate::render) fn finished(
     quantity: Quantity,
-    weights: &Weights,
-    (emission, absent): (&[f64], Option<&[f64]>),
+    weights: &WeightSums<'_>,
+    emission: &[f64],
+    absent: Option<&[f64]>,
 ) -> Vec<f32> {
-    let width = weights.size[0];
+    let width = weights.setup.camera.size[0];
     let pixel = |(at, emission): (usize, &f64)| {
         let present = weights.at([at % width, at / width]).present(absent.map_or(0.0, |absent| absent[at]));
-        quantity.of(*emission, present) as f32
+        quantity.pixel(*emission, present) as f32
     };
     emission.iter().enumerate().map(pixel).collect()
 }
@@ -160,7 +160,7 @@ pub(super) fn finished(
 struct Lanes([PixelWeight; LANES]);
 
 impl Lanes {
-    fn of(weights: &Weights, [x, y]: [usize; 2], count: usize) -> Self {
+    fn new(weights: &WeightSums<'_>, [x, y]: [usize; 2], count: usize) -> Self {
         Self(std::array::from_fn(|l| weights.at([x + l.min(count - 1), y])))
     }
 

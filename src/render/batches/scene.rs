@@ -4,26 +4,27 @@
 //! in planes (eq 9), and a linear map from planes to frames (eq 8). The rest of the renderer knows nothing else about
 //! them.
 
-use super::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
 use super::expectation::Expectation;
 use super::layout::Layout;
 use super::overview::OverviewRequest;
-use super::plane_values::{BlockPlanes, BlockSource};
+use super::plane_values::BlockPlanes;
+use super::read::BlockSource;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::memory;
 use crate::base::progress::Progress;
+use crate::render::config::{Limit, Mode, Quantity, RenderConfig, default_splat_error};
+use crate::render::report::LeftOut;
 use crate::view::camera::View;
 use crate::view::footprint::Kernel;
 use crate::wavelet::Lane;
-use serde::Serialize;
 
 /// A data source to render: a grid of voxels with a value in every frame, read block by block.
 ///
-/// The library has two scenes: [`super::CoefficientScene`] and [`super::FrameScene`]. Another program can implement
-/// this trait for its own data with three types: the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the
-/// planes of a scene are the values of its frames, the batch returns [`Layout::of_values`] and [`Selection::of_all`],
-/// and its inverse copies.
+/// The library has two scenes: [`CoefficientScene`](crate::render::CoefficientScene) and
+/// [`FrameScene`](crate::render::FrameScene). Another program can implement this trait for its own data with three types:
+/// the scene, a [`FrameBatch`] and a block ([`BlockPlanes`]). If the planes of a scene are the values of its frames, the
+/// batch returns [`Layout::of_values`] and [`Selection::of_all`], and its inverse copies.
 pub trait Scene {
     /// The grid of voxels.
     fn grid(&self) -> &Grid;
@@ -141,7 +142,7 @@ pub trait FrameBatch: Sync {
 
     /// The inverse transform (eq 8), from the planes of some pixels to their frames. Planes not listed in `used` are
     /// zero. The function takes at least [`Layout::planes`] lanes and fills [`Layout::frames`] lanes; a lane holds one
-    /// number for each of [`LANES`](super::LANES) pixels.
+    /// number for each of [`LANES`](crate::render::LANES) pixels.
     fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>>;
 
     /// Error bounds of the samples, to be combined with the sums of the error planes.
@@ -210,28 +211,6 @@ impl Selection {
             expected: vec![0.0; request.views.len()],
             ..Self::default()
         }
-    }
-}
-
-/// Counts of blocks and parts that are not read.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct LeftOut {
-    /// Blocks that are skipped entirely.
-    pub blocks: u64,
-    /// Parts that are not read, including the parts of skipped blocks.
-    pub parts: u64,
-    /// Nonzero coefficients in these parts.
-    pub coefficients: u64,
-    /// Stored bytes of these parts.
-    pub bytes: u64,
-}
-
-impl std::ops::AddAssign for LeftOut {
-    fn add_assign(&mut self, other: Self) {
-        self.blocks += other.blocks;
-        self.parts += other.parts;
-        self.coefficients += other.coefficients;
-        self.bytes += other.bytes;
     }
 }
 

@@ -2,9 +2,9 @@
 //!
 //! Small pictures of an overview show the range of values of the archive's pictures, at a small part of their work.
 
-use super::config::RenderConfig;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
+use crate::render::config::RenderConfig;
 use crate::view::camera::Camera;
 
 /// How a volume is thinned: of each block the voxels at multiples of `stride` from its first, along each axis. Blocks
@@ -25,7 +25,7 @@ impl Thinning {
     }
 
     /// The voxels along an axis that are taken.
-    pub(super) fn taken(&self, axis: usize) -> Vec<usize> {
+    pub(in crate::render) fn taken(&self, axis: usize) -> Vec<usize> {
         (0..self.blocks.dims[axis]).filter(|at| (at % self.blocks.edges[axis]).is_multiple_of(self.stride)).collect()
     }
 
@@ -70,7 +70,7 @@ impl OverviewRequest<'_> {
     }
 
     /// The index of the first sample of every row along x of a block, in a frame of an overview.
-    pub(super) fn rows(&self, block: usize) -> impl Iterator<Item = usize> + use<> {
+    pub(in crate::render) fn rows(&self, block: usize) -> impl Iterator<Item = usize> + use<> {
         let thinned = self.thinning.blocks();
         let (region, whole) = (thinned.region(block), Region { start: [0; 3], end: thinned.dims });
         region.rows().map(move |(y, z)| whole.index([region.start[0], y, z]))

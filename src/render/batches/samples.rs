@@ -1,18 +1,68 @@
 //! The samples of a block in every frame of a batch, from its planes.
 
+use super::layout::Layout;
+use super::plane_values::{BlockPlanes, PlaneValues, Scratch};
+use super::read::{BlockAdder, BlockReader, ReadStats};
+use super::scene::FrameBatch;
 use super::units::Units;
 use crate::base::error::Result;
-use crate::render::layout::Layout;
-use crate::render::plane_values::{BlockPlanes, PlaneValues, Scratch};
-use crate::render::scene::FrameBatch;
+use crate::base::grid::{BlockGrid, Region};
+use crate::base::progress::Progress;
 use crate::wavelet::{LANES, Lane};
 
+/// Reads the samples of a batch's blocks.
+pub(in crate::render) struct SampleReader<'a> {
+    pub(in crate::render) batch: &'a dyn FrameBatch,
+    pub(in crate::render) blocks: BlockGrid,
+    /// Blocks to decode at a time.
+    pub(in crate::render) at_a_time: usize,
+    pub(in crate::render) progress: &'a dyn Progress,
+}
+
+/// The voxels of a block, and their samples in each frame.
+pub(in crate::render) type BlockSamples = (Region, Vec<Vec<f32>>);
+
+impl SampleReader<'_> {
+    /// Reads blocks, with the samples of each frame in its units. `add` takes those that were read together, in order.
+    pub(in crate::render) fn read(
+        &self,
+        blocks: &[usize],
+        units: &[Units],
+        add: impl FnMut(&[BlockSamples]) + Sync,
+    ) -> Result<ReadStats> {
+        let reader = BlockReader { source: &self.batch, at_a_time: self.at_a_time, progress: self.progress };
+        reader.read(blocks, &mut SampleAdder { of: self, units, add })
+    }
+
+    /// The samples of a block in each frame, in the frame's units.
+    pub(in crate::render) fn read_one(&self, block: usize, units: &[Units]) -> Result<Vec<Vec<f32>>> {
+        self.progress.check()?;
+        self.batch.fetch(&[block])?;
+        samples(self.batch, self.batch.planes(block)?.as_ref(), units)
+    }
+}
+
+struct SampleAdder<'a, F> {
+    of: &'a SampleReader<'a>,
+    units: &'a [Units],
+    add: F,
+}
+
+impl<F: FnMut(&[BlockSamples]) + Sync> BlockAdder for SampleAdder<'_, F> {
+    type Block<'b> = BlockSamples;
+
+    fn prepare<'b>(&self, block: usize, planes: Box<dyn BlockPlanes + 'b>) -> Result<BlockSamples> {
+        Ok((self.of.blocks.region(block), samples(self.of.batch, planes.as_ref(), self.units)?))
+    }
+
+    fn add(&mut self, blocks: &[BlockSamples]) -> Result<()> {
+        (self.add)(blocks);
+        Ok(())
+    }
+}
+
 /// The samples of a block in each frame, in the frame's units; NaN is missing.
-pub(in crate::render) fn samples(
-    batch: &dyn FrameBatch,
-    block: &dyn BlockPlanes,
-    units: &[Units],
-) -> Result<Vec<Vec<f32>>> {
+fn samples(batch: &dyn FrameBatch, block: &dyn BlockPlanes, units: &[Units]) -> Result<Vec<Vec<f32>>> {
     let (layout, scratch) = (batch.layout(), &mut Scratch::default());
     let mut frames = Vec::with_capacity(units.len());
     if layout.coefficients > 0 {
@@ -33,19 +83,21 @@ pub(in crate::render) fn samples(
 
 /// The values of a plane in other units.
 fn in_units(plane: &PlaneValues<'_>, voxels: usize, units: &Units) -> Vec<f32> {
-    let mut out = vec![units.of(0.0); voxels];
+    let mut out = vec![units.number(0.0); voxels];
     match plane {
         PlaneValues::Nothing => {}
         PlaneValues::Single(values) => convert(values, *units, &mut out),
         PlaneValues::Double(values) => convert(values, *units, &mut out),
-        PlaneValues::Few(values) => values.iter().for_each(|(voxel, value)| out[*voxel as usize] = units.of(*value)),
+        PlaneValues::Few(values) => {
+            values.iter().for_each(|(voxel, value)| out[*voxel as usize] = units.number(*value));
+        }
     }
     out
 }
 
 #[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 fn convert<T: Copy + Into<f64>>(values: &[T], units: Units, out: &mut [f32]) {
-    out.iter_mut().zip(values).for_each(|(out, value)| *out = units.of((*value).into()));
+    out.iter_mut().zip(values).for_each(|(out, value)| *out = units.number((*value).into()));
 }
 
 /// Replaces missing samples by NaN.

@@ -20,7 +20,7 @@ pub enum PlaneValues<'a> {
 
 impl PlaneValues<'_> {
     /// Calls `visit(voxel, value)` for all nonzero values, ascending by voxel.
-    pub(super) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
+    pub(in crate::render) fn for_each(&self, mut visit: impl FnMut(usize, f64)) {
         let mut all = |values: &mut dyn Iterator<Item = f64>| {
             values.enumerate().filter(|(_, value)| *value != 0.0).for_each(|(voxel, value)| visit(voxel, value));
         };
@@ -33,7 +33,7 @@ impl PlaneValues<'_> {
     }
 
     /// Adds `factor` times each value to the sum of its voxel.
-    pub(super) fn add_to(&self, factor: f64, sums: &mut [f64]) {
+    pub(in crate::render) fn add_to(&self, factor: f64, sums: &mut [f64]) {
         match self {
             Self::Nothing => {}
             Self::Single(values) => add_scaled(values, factor, sums),
@@ -63,7 +63,7 @@ pub trait BlockPlanes: Send + Sync {
     /// Number of voxels in the block.
     fn voxels(&self) -> usize;
 
-    /// The values of a plane, 0 to [`Layout::planes`](super::Layout::planes). They may be stored in `scratch`.
+    /// The values of a plane, 0 to [`Layout::planes`](crate::render::Layout::planes). They may be stored in `scratch`.
     ///
     /// # Errors
     /// Any error ends the rendering.
@@ -73,23 +73,12 @@ pub trait BlockPlanes: Send + Sync {
     fn held(&self) -> [u64; 2];
 }
 
-/// A source of blocks.
-pub(super) trait BlockSource: Sync {
-    /// Prepares to read these blocks next.
-    fn fetch(&self, _blocks: &[usize]) -> Result<()> {
-        Ok(())
-    }
-
-    /// Reads a block.
-    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>>;
-}
-
 /// Buffers for the values of a plane, reused from call to call.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    pub(super) bytes: Vec<u8>,
-    pub(super) single: Vec<f32>,
-    pub(super) double: Vec<f64>,
+    pub(in crate::render) bytes: Vec<u8>,
+    pub(in crate::render) single: Vec<f32>,
+    pub(in crate::render) double: Vec<f64>,
 }
 
 impl Scratch {
@@ -100,7 +89,7 @@ impl Scratch {
     }
 
     /// The samples in `bytes`; none of them is missing.
-    pub(super) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
+    pub(in crate::render) fn samples(&mut self, ty: SampleType) -> PlaneValues<'_> {
         let count = self.bytes.len() / ty.size();
         if matches!(ty, SampleType::U32 | SampleType::I32 | SampleType::F64) {
             // f32 cannot represent these exactly.
@@ -115,7 +104,7 @@ impl Scratch {
 
     /// The samples in `bytes`, with zeros for missing samples. If `absent`, ones for missing samples and zeros
     /// elsewhere instead.
-    pub(super) fn masked(
+    pub(in crate::render) fn masked(
         &mut self,
         ty: SampleType,
         absent: bool,
@@ -136,7 +125,7 @@ impl Scratch {
 
 /// A block of this many voxels with the value 1.
 #[derive(Debug)]
-pub(super) struct UnitValues(pub(super) usize);
+pub(in crate::render) struct UnitValues(pub(in crate::render) usize);
 
 impl BlockPlanes for UnitValues {
     fn voxels(&self) -> usize {
