@@ -50,8 +50,7 @@ pub use remote::RemoteArgs;
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
 pub use values::{
-    Dims, FrameList, FrameRange, MaxError, Numbers, Opacities, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole,
-    share,
+    Dims, FrameList, FrameRange, Numbers, Opacities, OpacityPoints, Pair, RegionSpec, Size, Triple, Whole, share,
 };
 
 use crate::base::error::{Error, Result};
