@@ -1,7 +1,7 @@
 //! The options of `wavesplat convert`, and the request that they make.
 
 use super::given::GivenOptions;
-use clap::{Args, ValueEnum};
+use clap::{Arg, Args, ValueEnum};
 use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, open_colours, share};
@@ -23,7 +23,9 @@ Examples:
   wavesplat convert run.nc -o run_%n.wspl --variable u,v,w
   wavesplat convert old.wspl -o new.wspl
   wavesplat convert frames/ --scan scan.json --shard 3/16 -o part-3.wspl",
-    after_help = after_help()
+    after_help = "--help lists all options.",
+    after_long_help = after_help(),
+    mut_args(hidden_in_short_help)
 )]
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
@@ -115,6 +117,32 @@ pub(crate) struct ConvertArgs {
     pub(super) level: i32,
     #[command(flatten)]
     pub(crate) common: CommonArgs,
+}
+
+/// The options that `-h` shows: those that most people need. `--help` shows all.
+const IN_SHORT_HELP: [&str; 13] = [
+    "inputs",
+    "output",
+    "force",
+    "resume",
+    "tolerance",
+    "max_error",
+    "missing_value",
+    "frames",
+    "dims",
+    "dtype",
+    "variable",
+    "threads",
+    "memory",
+];
+
+/// Hides most options in the short help. Man pages leave out the text of a hidden option, unless it is a long one.
+fn hidden_in_short_help(arg: Arg) -> Arg {
+    if IN_SHORT_HELP.contains(&arg.get_id().as_str()) {
+        return arg;
+    }
+    let help = arg.get_help().cloned().unwrap_or_default();
+    arg.hide_short_help(true).long_help(help)
 }
 
 /// The headings of the help.
