@@ -10,7 +10,7 @@ use wavesplat::base::mapped::{Access, FileBytes};
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{
-    Basis, Bound, ConvertConfig, PartialFile, SchemeConstraint, SpatialPredictor, Stencil, resume,
+    Basis, Bound, ConvertConfig, ResumePoint, SchemeConstraint, SpatialPredictor, Stencil, Target, convert_into,
 };
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::recover::recover;
@@ -140,9 +140,10 @@ fn golden_files_are_continued_under_their_own_id() {
         let (id, windows) = (unfinished.id(), unfinished.metadata().windows.clone());
         let kept = golden[..unfinished.bytes() as usize].to_vec();
         assert!(!windows.is_empty(), "{name}: whole windows are left");
-        let begun = Some(PartialFile { complete: unfinished, first_window: windows.len(), description: None });
+        let resume_from = Some(ResumePoint { complete: unfinished, first_window: windows.len(), description: None });
         let mut bytes = kept.clone();
-        resume(&mut source(seed, (ty, kind, mask)), &config, begun, Path::new("a.wspl"), &mut bytes, &Silent).unwrap();
+        let target = Target { name: Path::new("a.wspl"), out: &mut bytes, resume_from };
+        convert_into(&mut source(seed, (ty, kind, mask)), &config, target, &Silent).unwrap();
         let work = tempfile::tempdir().unwrap();
         let path = work.path().join("continued.wspl");
         fs::write(&path, &bytes).unwrap();

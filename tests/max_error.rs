@@ -13,7 +13,7 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{Basis, Bound, ConvertConfig, convert, of_file};
+use wavesplat::convert::{Basis, Bound, ConvertConfig, convert};
 use wavesplat::file::promise::max_error;
 use wavesplat::file::verify::verify;
 
@@ -34,7 +34,7 @@ fn check(memory: &mut Memory, bytes: &[u8], ty: SampleType, config: &ConvertConf
     let stored = stored(memory, config);
     let file = stored.open();
     assert_eq!(max_error(file.metadata()), Some(error));
-    assert_eq!(of_file(file.metadata(), config.memory).unwrap().max_error, Some(error));
+    assert_eq!(ConvertConfig::from_file(file.metadata(), config.memory).unwrap().max_error, Some(error));
     let exact = error == 0.0 || error > 1e-280;
     assert!(stored.report.delta <= error && (!exact || stored.report.delta == error), "{error:e}");
     let back = extracted(&file);

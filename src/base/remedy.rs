@@ -52,6 +52,8 @@ pub enum Remedy {
     BuildWith(&'static str),
     /// Allow the existing file to be replaced.
     Replace,
+    /// Allow the existing file to be replaced, or append to it.
+    ReplaceOrAppend,
     /// Discard the unfinished file and start over.
     BeginAnew,
     /// Resume the unfinished file, or discard it and start over.

@@ -93,29 +93,6 @@ pub struct InputArgs {
 }
 
 impl InputArgs {
-    /// An error if an option is given that a coefficient file does not need.
-    pub fn refuse_for_coefficients(&self) -> Result<()> {
-        let given = [
-            (self.dims.is_some(), "--dims"),
-            (self.dtype.is_some(), "--dtype"),
-            (self.endian.is_some(), "--endian"),
-            (self.offset.is_some(), "--offset"),
-            (self.variable.is_some(), "--variable"),
-            (!self.magnitude.is_empty(), "--magnitude"),
-            (self.axes.is_some(), "--axes"),
-            (self.spacing.is_some(), "--spacing"),
-            (self.origin.is_some(), "--origin"),
-            (self.times.is_some(), "--times"),
-            (self.dt.is_some(), "--dt"),
-            (self.time_unit.is_some(), "--time-unit"),
-            (self.allow_gaps, "--allow-gaps"),
-        ];
-        match given.into_iter().find(|(given, _)| *given) {
-            Some((_, name)) => Err(Error::usage(format!("{name}: is for frames; a coefficient file does not need it"))),
-            None => Ok(()),
-        }
-    }
-
     /// How the bytes of files are read.
     pub fn access(&self) -> Access {
         Access::unless(self.no_mmap)
@@ -204,6 +181,14 @@ impl InputArgs {
             ("time-unit", self.time_unit.clone()),
         ];
         given.into_iter().filter_map(|(name, value)| Some((name, value?)))
+    }
+
+    /// An error if an option is given that a coefficient file does not need.
+    pub fn refuse_for_coefficients(&self) -> Result<()> {
+        let option = |name| if name == times::TIMES && self.dt.is_some() { "dt" } else { name };
+        let given = self.settings().map(|(name, _)| option(name)).chain(self.allow_gaps.then_some("allow-gaps")).next();
+        let refused = |name| format!("--{name}: is for frames; a coefficient file does not need it");
+        given.map_or(Ok(()), |name| Err(Error::usage(refused(name))))
     }
 
     /// The coefficient file, if that is the only input; none if the inputs are frames.

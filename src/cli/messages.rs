@@ -8,7 +8,9 @@ use std::borrow::Cow;
 /// The text of an error, with a tip if it has a remedy.
 pub fn of_error(error: &Error, command: &Command) -> String {
     let text = match error {
-        Error::Setting { setting, problem, .. } => format!("error: {}: {problem}", option(setting, command)),
+        Error::Setting { setting, problem, .. } => {
+            format!("error: {}: {}", option(setting, command), with_options(problem, command))
+        }
         other => format!("error: {other}"),
     };
     error.remedy().map(|remedy| format!("{text}\n  tip: {}", advice(&remedy))).unwrap_or(text)
@@ -38,10 +40,23 @@ fn name(field: &str) -> String {
 
 /// The option that sets a field, or the field's name if the program has no such option.
 fn option(setting: &str, command: &Command) -> String {
+    long_option(setting, command).unwrap_or_else(|| setting.replace('_', " "))
+}
+
+/// The option that sets a field, if the program has it.
+fn long_option(setting: &str, command: &Command) -> Option<String> {
     let name = name(setting);
     let mut commands = std::iter::once(command).chain(command.get_subcommands());
     let is_option = commands.any(|c| c.get_arguments().any(|arg| arg.get_long() == Some(name.as_str())));
-    if is_option { format!("--{name}") } else { setting.replace('_', " ") }
+    is_option.then(|| format!("--{name}"))
+}
+
+/// A text with options in place of the fields that it has in backquotes. What is no option stays.
+fn with_options(text: &str, command: &Command) -> String {
+    let parts: Vec<&str> = text.split('`').collect();
+    let option = |quoted: &str| long_option(quoted, command).unwrap_or_else(|| format!("`{quoted}`"));
+    let worded = |(n, part): (usize, &&str)| if n % 2 == 1 { option(part) } else { (*part).to_string() };
+    if parts.len().is_multiple_of(2) { text.into() } else { parts.iter().enumerate().map(worded).collect() }
 }
 
 /// Advice that names options of the programs.
@@ -68,6 +83,7 @@ pub fn advice(remedy: &Remedy) -> Cow<'static, str> {
             return format!("build with cargo build --release --features {feature}").into();
         }
         Remedy::Replace => "--force replaces it",
+        Remedy::ReplaceOrAppend => "--force replaces it, append adds frames",
         Remedy::BeginAnew => "--force starts over",
         Remedy::ResumeOrBeginAnew => "--resume continues it, --force starts over",
         Remedy::AppendOrBeginAnew { frames } => return append(*frames).into(),
@@ -127,6 +143,8 @@ mod tests {
         let error = Error::setting("sample", Note::with("is wrong", Remedy::Adjust(&["dims", "sample", "offset"])));
         let text = of_error(&error, &command());
         assert_eq!(text, "error: --dtype: is wrong\n  tip: adjust --dims, --dtype or --offset");
+        let text = of_error(&Error::setting("splat_error", "needs `sample`, not `a b`"), &command());
+        assert_eq!(text, "error: --splat-error: needs --dtype, not `a b`");
     }
 
     #[test]

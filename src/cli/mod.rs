@@ -10,8 +10,6 @@ mod advice;
 #[cfg(feature = "cli")]
 mod choice;
 #[cfg(feature = "cli")]
-mod colours;
-#[cfg(feature = "cli")]
 mod common;
 #[cfg(feature = "cli")]
 mod config;
@@ -40,8 +38,6 @@ pub use crate::base::inputs::spare_inputs;
 pub use crate::base::values::{FrameList, FrameRange, Numbers, Pair, RegionSpec, Triple, Whole};
 pub use crate::colour::OpacityPoints;
 #[cfg(feature = "cli")]
-pub use colours::transfer_function;
-#[cfg(feature = "cli")]
 pub use common::CommonArgs;
 #[cfg(feature = "cli")]
 pub use generate::{GenerateArgs, Generated};
@@ -54,7 +50,7 @@ pub use remote::RemoteArgs;
 #[cfg(feature = "cli")]
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
-pub use values::{Dims, MaxError, Size, share};
+pub use values::{Dims, Size, share};
 
 use crate::base::error::{Error, Result};
 use std::io::{self, Write};

@@ -1,9 +1,11 @@
 //! Estimates the size of a coefficient file by coding some blocks of some windows.
 
+use super::coded_input::CodedInput;
 use super::gather::{Batch, WindowReader};
-use super::record::Recorder;
+use super::record::WindowWriter;
 use super::variation::Variation;
-use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Task, WindowJob, WindowsDone, encode_batch};
+use super::warnings::Findings;
+use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Target, WindowJob, WindowsDone, encode_batch};
 use crate::base::error::{Error, Result};
 use crate::base::grid::BlockGrid;
 use crate::base::output::STANDARD;
@@ -78,28 +80,33 @@ pub fn estimates(
         ));
     };
     let source_archive = Archive { description: None, ..source_archive }; // it is not of some blocks
-    let Task { config: first, archive, colour_transform } = Task::new(config, &source_archive);
-    let plan = Plan::new(&first, &archive, colour_transform.as_ref())?;
-    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, first.window));
+    let first = CodedInput::new(config, &source_archive);
+    let plan = Plan::new(&first)?;
+    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, first.config.window));
     progress.start(Some((windows.len() * configs.len()) as u64));
-    let read =
-        FramesRead { archive: &source_archive, missing_value: first.missing_value, plan: &plan, blocks: &blocks };
+    let read = FramesRead {
+        archive: &source_archive,
+        missing_value: first.config.missing_value,
+        plan: &plan,
+        blocks: &blocks,
+    };
     let (found, variation) = read.range(source, &windows)?;
-    let mut of = |config: &ConvertConfig| {
-        let Task { config, archive, colour_transform } = Task::new(config, &source_archive);
-        let plan = Plan::new(&config, &archive, colour_transform.as_ref())?;
-        let range = config.range.unwrap_or(found);
-        let config = ConvertConfig { range: Some(range), ..config };
-        let coded = BlocksCoded { config: &config, archive: &archive, plan: &plan, blocks: &blocks, range: found };
+    let mut estimated = |config: &ConvertConfig| {
+        let mut input = CodedInput::new(config, &source_archive);
+        let asked = input.clone();
+        let plan = Plan::new(&asked)?;
+        let range = *input.config.range.get_or_insert(found);
+        let (config, archive) = (&input.config, &input.archive);
+        let coded = BlocksCoded { input: &input, plan: &plan, blocks: &blocks, range: found };
         let bytes = scaled(coded.bytes(source, &windows, progress)?, &coded, &windows, frames);
         let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
         let error = range_bound(config.tolerance, range);
-        let lost = variation.share_below(error).filter(|_| colour_transform.is_none());
+        let lost = variation.share_below(error).filter(|_| input.colour_transform.is_none());
         let (ratio, tolerance) = (raw / bytes.max(1.0), config.tolerance);
         let bytes = bytes as u64;
         Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks: blocks.len(), windows: windows.len() })
     };
-    let estimates = configs.iter().map(&mut of).collect::<Result<Vec<_>>>()?;
+    let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>()?;
     progress.finish();
     Ok(estimates)
 }
@@ -108,7 +115,7 @@ pub fn estimates(
 fn scaled(bytes: u64, coded: &BlocksCoded<'_>, windows: &[Range<usize>], frames: usize) -> f64 {
     let voxels = coded.blocks.iter().map(|block| coded.plan.blocks.region(*block).voxels()).sum::<usize>();
     let samples = voxels * windows.iter().map(ExactSizeIterator::len).sum::<usize>();
-    let all = coded.archive.grid.whole().voxels() as f64 * frames as f64;
+    let all = coded.input.archive.grid.whole().voxels() as f64 * frames as f64;
     bytes as f64 * all / samples as f64
 }
 
@@ -152,11 +159,11 @@ impl FramesRead<'_> {
         for frames in windows {
             let window = source.window(frames.start, frames.len())?;
             for frame in self.extreme_frames(window.as_ref(), &mut variation)? {
-                range = join_ranges(range, self.of_frame(window.as_ref(), frame)?);
+                range = join_ranges(range, self.range_of_frame(window.as_ref(), frame)?);
             }
         }
         let last = source.window(self.archive.frames.unwrap_or(1) - 1, 1)?;
-        range = join_ranges(range, self.of_frame(last.as_ref(), 0)?);
+        range = join_ranges(range, self.range_of_frame(last.as_ref(), 0)?);
         Ok((if range.0 <= range.1 { range } else { (0.0, 0.0) }, variation))
     }
 
@@ -167,8 +174,8 @@ impl FramesRead<'_> {
         for (number, block) in self.blocks.iter().enumerate() {
             let (region, ty) = (self.plan.blocks.region(*block), self.archive.sample);
             read_frames_into(window, 0..window.frames(), &region, ty, &mut samples)?;
-            let of = SampledBox { size: region.dims(), known: region.dims() };
-            variation.add_block((number, self.blocks.len()), &of, ty, self.missing_value, &samples);
+            let extent = SampledBox { size: region.dims(), known: region.dims() };
+            variation.add_block(number, self.blocks.len(), &extent, ty, self.missing_value, &samples);
             for (range, frame) in ranges.iter_mut().zip(samples.chunks_exact(region.voxels() * ty.size())) {
                 *range = join_ranges(*range, sample::range_of_present(ty, frame, self.missing_value, |_| {}));
             }
@@ -178,7 +185,7 @@ impl FramesRead<'_> {
         Ok([0].into_iter().chain(least).chain(largest).collect())
     }
 
-    fn of_frame(&self, window: &dyn FrameWindow, frame: usize) -> Result<(f64, f64)> {
+    fn range_of_frame(&self, window: &dyn FrameWindow, frame: usize) -> Result<(f64, f64)> {
         let Archive { grid, sample, .. } = self.archive;
         Ok(scan_frame(Scan::NOTHING, window, frame, grid, *sample, self.missing_value)?.range)
     }
@@ -186,9 +193,8 @@ impl FramesRead<'_> {
 
 /// The blocks that are coded, as if they were all of a file.
 struct BlocksCoded<'a> {
-    config: &'a ConvertConfig,
-    /// The archive of the coded samples.
-    archive: &'a Archive,
+    /// With the range that was found, if none is given.
+    input: &'a CodedInput,
     plan: &'a Plan<'a>,
     blocks: &'a [usize],
     /// The value range that was found.
@@ -199,20 +205,21 @@ impl BlocksCoded<'_> {
     /// The bytes of a file of these blocks in these windows.
     fn bytes(&self, source: &mut dyn FrameSource, windows: &[Range<usize>], progress: &dyn Progress) -> Result<u64> {
         let started = Instant::now();
-        let plan = self.plan.of_blocks(self.blocks.len());
-        let mut file = Recorder::new((self.config, self.archive), &plan, Path::new("estimate"), io::sink(), None);
+        let plan = self.plan.for_blocks(self.blocks.len());
+        let target = Target { name: Path::new("estimate"), out: io::sink(), resume_from: None };
+        let mut file = WindowWriter::new(self.input, &plan, target);
         let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
-        let mut reader = WindowReader::new((self.config, self.archive), self.plan, &done, &idle);
+        let mut reader = WindowReader::new(self.input, self.plan, &done, &idle);
         for (index, frames) in windows.iter().enumerate() {
             let window = source.window(frames.start, frames.len())?;
             let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range: self.range, ..Scan::NOTHING })?);
             for batch in self.batches(&reader, window.as_ref(), &job) {
-                let encoded = encode_batch(self.config.level, self.plan, (&encoders, &idle), batch?)?;
+                let encoded = encode_batch(self.input.config.level, self.plan, &encoders, &idle, batch?)?;
                 file.append(&self.renumbered(encoded))?;
             }
             progress.advance(1);
         }
-        Ok(file.finish(started, Default::default(), Duration::ZERO)?.output_bytes)
+        Ok(file.finish(started, Duration::ZERO, &Findings::default(), Duration::ZERO)?.output_bytes)
     }
 
     /// The samples of the coded blocks of all channels, in batches.

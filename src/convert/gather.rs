@@ -1,8 +1,8 @@
 //! The reader stage: reads windows of frames and sends batches of blocks.
 
 use super::choose::{SchemeSelector, SpatialPredictor, most_samples};
+use super::coded_input::{BRIGHTNESS, CodedInput};
 use super::sampled::{self, Pixel};
-use super::task::BRIGHTNESS;
 use super::warnings::{self, Fill, Findings};
 use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
 use crate::base::error::{Error, Note, Remedy, Result};
@@ -18,33 +18,40 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_format::{BlockId, Features, FileId, Packing, Window};
 
-/// Blocks of one window with their samples, frame by frame.
+/// Blocks of one window with their samples.
 #[derive(Debug)]
 pub(super) struct Batch {
     pub(super) window: Arc<WindowJob>,
-    pub(super) blocks: Vec<(BlockId, Vec<u8>)>,
+    pub(super) blocks: Vec<BlockSamples>,
     /// Whether this is the last batch of its window. The source was still unchanged after it was read.
     pub(super) last: bool,
+}
+
+/// The samples of a block, frame by frame.
+#[derive(Debug)]
+pub(super) struct BlockSamples {
+    pub(super) id: BlockId,
+    pub(super) samples: Vec<u8>,
 }
 
 /// Reads all windows in order until the frames end, and sends those that the file does not have yet. Returns the time
 /// spent reading, and what it saw in the samples.
 pub(super) fn read(
     source: &mut dyn FrameSource,
-    (config, archive): (&ConvertConfig, &Archive),
+    input: &CodedInput,
     plan: &Plan<'_>,
     done: &WindowsDone,
     idle: &Pool<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<(Duration, Findings)> {
-    let mut reader = WindowReader::new((config, archive), plan, done, idle);
+    let mut reader = WindowReader::new(input, plan, done, idle);
     done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
     reader.before = reader.frames;
     let mut busy = Duration::ZERO;
     for index in done.first_window.. {
         let started = Instant::now();
         let known = done.windows.get(index);
-        let Some(window) = reader.next(source, known.map_or(config.window, |w| w.frames as usize))? else {
+        let Some(window) = reader.next(source, known.map_or(input.config.window, |w| w.frames as usize))? else {
             match known {
                 Some(_) => return Err(reader.ended(done)),
                 None => break,
@@ -55,13 +62,13 @@ pub(super) fn read(
             busy += started.elapsed();
             continue;
         }
-        if index > done.first_window && done.windows.get(index - 1).is_some_and(|w| (w.frames as usize) < config.window)
-        {
+        let is_short = |window: &Window| (window.frames as usize) < input.config.window;
+        if index > done.first_window && done.windows.get(index - 1).is_some_and(is_short) {
             return Err(reader.has_grown(done));
         }
         let job = Arc::new(reader.prepare(window.as_ref(), index)?);
         busy += started.elapsed();
-        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < config.window {
+        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < input.config.window {
             break; // the frames ended, or a later stage failed and reports why
         }
     }
@@ -93,12 +100,8 @@ pub(super) struct WindowReader<'a> {
 }
 
 impl<'a> WindowReader<'a> {
-    pub(super) fn new(
-        (config, archive): (&'a ConvertConfig, &'a Archive),
-        plan: &'a Plan<'a>,
-        done: &WindowsDone,
-        idle: &'a Pool<Vec<u8>>,
-    ) -> Self {
+    pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, done: &WindowsDone, idle: &'a Pool<Vec<u8>>) -> Self {
+        let CodedInput { config, archive, .. } = input;
         let pixels = match config.bound {
             Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
             _ => Vec::new(),
@@ -294,14 +297,13 @@ impl<'a> WindowReader<'a> {
     }
 
     /// Looks at how some voxels of a block vary.
-    fn look_at_variation(&mut self, job: &WindowJob, (id, samples): &(BlockId, Vec<u8>)) {
+    fn look_at_variation(&mut self, job: &WindowJob, read: &BlockSamples) {
         if self.plan.colour_transform.is_some() {
             return;
         }
-        let block = id.block as usize;
-        let (of, all) = (self.plan.sampled_box(&job.codec, block), self.plan.blocks.len());
-        let missing_value = self.config.missing_value;
-        self.findings.variation.add_block((block, all), &of, self.archive.sample, missing_value, samples);
+        let (block, all) = (read.id.block as usize, self.plan.blocks.len());
+        let (extent, ty) = (self.plan.sampled_box(&job.codec, block), self.archive.sample);
+        self.findings.variation.add_block(block, all, &extent, ty, self.config.missing_value, &read.samples);
     }
 
     /// Reads and sends the window's blocks. False if the receiver is gone.
@@ -332,7 +334,7 @@ impl<'a> WindowReader<'a> {
     }
 
     /// Reads the samples that coding one block takes, frame by frame. Block numbers run through all channels.
-    pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
+    pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<BlockSamples> {
         let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
         let Region { start, .. } = self.plan.blocks.region(block);
         let known = self.plan.sampled_box(&job.codec, block).known;
@@ -340,13 +342,13 @@ impl<'a> WindowReader<'a> {
         let mut samples = self.idle.take().unwrap_or_default();
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
         read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;
-        Ok((BlockId { window: job.index, block: block as u32, channel: channel as u16 }, samples))
+        Ok(BlockSamples { id: BlockId { window: job.index, block: block as u32, channel: channel as u16 }, samples })
     }
 }
 
 /// The colour channels of a window; empty if samples are coded directly.
 fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {
-    let of =
+    let all =
         |colour_transform| (0..plan.channels()).map(move |channel| ColourWindow { window, colour_transform, channel });
-    plan.colour_transform.into_iter().flat_map(of).collect()
+    plan.colour_transform.into_iter().flat_map(all).collect()
 }

@@ -12,22 +12,25 @@
 //! the archive's. So conversion needs only one pass over the data, and a pipe gives the same bytes as files.
 //!
 //! A window is completed in the file only after its source was found unchanged; then `out` is flushed. So a killed
-//! conversion leaves a file that is valid up to its last complete window, and [`resume`] continues there. Each window's
+//! conversion leaves a file that is valid up to its last complete window, and [`convert_into`] continues there. Each window's
 //! record holds all that the next window needs, so the resumed file has the same bytes as an uninterrupted one.
 
 mod choose;
+mod coded_input;
 pub mod estimate;
 mod gather;
 mod learn;
+mod max_error;
 mod plan;
 mod pool;
 mod record;
+mod request;
+mod run;
 #[doc(hidden)]
 pub mod sampled;
 mod settings;
 pub mod shard;
 mod smoothness;
-mod task;
 mod to_file;
 mod variation;
 mod warnings;
@@ -43,26 +46,28 @@ use crate::colour::TransferFunction;
 use crate::file::report::{BoundReport, WindowReport};
 use crate::source::{Archive, ColourTransform, FrameSource};
 pub use choose::{SchemeConstraint, SpatialPredictor};
+use coded_input::CodedInput;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use gather::Batch;
+use gather::{Batch, BlockSamples};
+pub use max_error::MaxError;
 use plan::Plan;
 use pool::Pool;
 use rayon::prelude::*;
-use record::Recorder;
-use serde::Serialize;
-#[doc(hidden)]
-pub use settings::{of_file, options};
+use record::WindowWriter;
+pub use request::ConvertRequest;
+pub use run::{Failure, append, run};
+use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use task::Task;
 pub use to_file::convert_to_file;
 pub use wavesplat_format::{Basis, Packing, Stencil};
-use wavesplat_format::{BlockId, CompletePrefix, Features, FileId, Metadata, Window};
+use wavesplat_format::{BlockId, CompletePrefix, Features, FileId, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum MissingPolicy {
     /// Reject the input; the error names the first one and their number.
     Error,
@@ -164,7 +169,7 @@ impl ConvertConfig {
 }
 
 /// The default of [`ConvertConfig::chain`].
-pub(crate) const CHAIN: usize = 8;
+const CHAIN: usize = 8;
 
 /// The report of a conversion.
 #[derive(Debug, Clone, Serialize)]
@@ -222,15 +227,26 @@ pub struct ConvertReport {
     pub not_kept: Vec<String>,
 }
 
-/// The complete windows of a file that more frames are added to.
+/// Where a conversion goes on: the complete windows of a file that more frames are added to.
 #[derive(Debug)]
-pub struct PartialFile {
+pub struct ResumePoint {
     /// The file's complete windows.
     pub complete: CompletePrefix,
     /// Number of the window at which the source begins. Earlier windows are not compared with the source.
     pub first_window: usize,
     /// The description of the windows before it, if there are any and the file has one.
     pub description: Option<Description>,
+}
+
+/// What a conversion writes to.
+#[derive(Debug)]
+pub struct Target<'a, W> {
+    /// What messages call it.
+    pub name: &'a Path,
+    /// The stream, at the end of the windows that it has already.
+    pub out: W,
+    /// The windows that it has already; `None` begins a file.
+    pub resume_from: Option<ResumePoint>,
 }
 
 /// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without seeking.
@@ -243,50 +259,48 @@ pub fn convert<W: Write>(
     out: W,
     progress: &dyn Progress,
 ) -> Result<ConvertReport> {
-    resume(source, config, None, name, out, progress)
+    convert_into(source, config, Target { name, out, resume_from: None }, progress)
 }
 
-/// As [`convert`], continuing a partial file after its complete windows; `out` must be at their end.
+/// As [`convert`], continuing a partial file after its complete windows if the target has some.
 ///
 /// # Errors
 /// Those of [`convert`]; also an error if the partial file has other settings, or was converted from other frames.
-pub fn resume<W: Write>(
+pub fn convert_into<W: Write>(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,
-    begun: Option<PartialFile>,
-    name: &Path,
-    out: W,
+    target: Target<'_, W>,
     progress: &dyn Progress,
 ) -> Result<ConvertReport> {
     let started = Instant::now();
-    let Task { config, archive, colour_transform } = &Task::new(config, source.archive());
-    let plan = Plan::new(config, archive, colour_transform.as_ref())?;
-    check_description(archive, begun.as_ref())?;
-    let done = WindowsDone::of(begun.as_ref(), (&plan, archive), name)?;
-    let windows = archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
+    let input = &CodedInput::new(config, source.archive());
+    let plan = Plan::new(input)?;
+    check_description(&input.archive, target.resume_from.as_ref())?;
+    let done = WindowsDone::new(target.resume_from.as_ref(), &plan, &input.archive, target.name)?;
+    let windows = input.archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
     progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
     progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
-    let mut recorder = Recorder::new((config, archive), &plan, name, out, begun);
+    let mut writer = WindowWriter::new(input, &plan, target);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
     let idle = Pool::default();
-    let (read_time, encode_time) = std::thread::scope(|scope| {
+    let ((read, findings), encoding) = std::thread::scope(|scope| {
         // Each stage owns its ends of the channels. When a stage ends, even by an error, its neighbours end too.
         let (plan, done, idle) = (&plan, &done, &idle);
-        let reader = scope.spawn(move || gather::read(source, (config, archive), plan, done, idle, &to_workers));
+        let reader = scope.spawn(move || gather::read(source, input, plan, done, idle, &to_workers));
         let workers = scope.spawn(move || encode(config.level, plan, idle, &from_reader, &to_writer));
-        let written = recorder.write(from_workers, progress);
+        let written = writer.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
     })?;
-    let report = recorder.finish(started, read_time, encode_time)?;
+    let report = writer.finish(started, read, &findings, encoding)?;
     progress.finish();
     Ok(report)
 }
 
 /// Checks that the source's description fits its frames, so that a mismatch fails at the start and not at the end.
-fn check_description(archive: &Archive, begun: Option<&PartialFile>) -> Result<()> {
-    let is_appended = begun.is_some_and(|begun| begun.first_window > 0);
+fn check_description(archive: &Archive, resume_from: Option<&ResumePoint>) -> Result<()> {
+    let is_appended = resume_from.is_some_and(|point| point.first_window > 0);
     let fits = |description: &Description| {
         is_appended || archive.frames.is_some_and(|frames| is_of(description, archive.grid.dims, frames))
     };
@@ -294,13 +308,6 @@ fn check_description(archive: &Archive, begun: Option<&PartialFile>) -> Result<(
         true => Ok(()),
         false => Err(Error::setting("description", "its axes are not those of the frames")),
     }
-}
-
-/// The metadata of a file of `archive` before its first frame: all that is decided without reading samples.
-#[doc(hidden)]
-pub fn open_partial(config: &ConvertConfig, archive: &Archive) -> Result<Metadata> {
-    let Task { config, archive, colour_transform } = &Task::new(config, archive);
-    Plan::new(config, archive, colour_transform.as_ref()).map(|plan| plan.start)
 }
 
 /// Propagates the panic of a stage, which is a bug and not an error.
@@ -315,14 +322,14 @@ struct WindowsDone {
     /// Those of the file that is continued.
     features: Option<Features>,
     windows: Vec<Window>,
-    /// [`PartialFile::first_window`]
+    /// [`ResumePoint::first_window`]
     first_window: usize,
     name: PathBuf,
 }
 
 impl WindowsDone {
-    fn of(begun: Option<&PartialFile>, (plan, archive): (&Plan<'_>, &Archive), name: &Path) -> Result<Self> {
-        let Some(PartialFile { complete, first_window, .. }) = begun else { return Ok(Self::default()) };
+    fn new(resume_from: Option<&ResumePoint>, plan: &Plan<'_>, archive: &Archive, name: &Path) -> Result<Self> {
+        let Some(ResumePoint { complete, first_window, .. }) = resume_from else { return Ok(Self::default()) };
         let held = complete.metadata();
         if let Some(what) = settings::difference(&held.start(), &plan.start, *first_window == 0) {
             return Err(Error::path(name, format!("was begun with another {what}")));
@@ -356,7 +363,7 @@ fn encode(
     let mut busy = Duration::ZERO;
     for batch in batches {
         let started = Instant::now();
-        let encoded = encode_batch(level, plan, (&encoders, read), batch)?;
+        let encoded = encode_batch(level, plan, &encoders, read, batch)?;
         busy += started.elapsed();
         if out.send(encoded).is_err() {
             break; // the writer failed and reports why
@@ -371,14 +378,15 @@ type Encoders = Pool<Encoder>;
 fn encode_batch(
     level: i32,
     plan: &Plan<'_>,
-    (encoders, read): (&Encoders, &Pool<Vec<u8>>),
+    encoders: &Encoders,
+    read: &Pool<Vec<u8>>,
     Batch { window, blocks, last }: Batch,
 ) -> Result<EncodedBatch> {
-    let encode = |(id, samples): (BlockId, Vec<u8>)| {
+    let encode = |BlockSamples { id, samples }| {
         let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-        let of = plan.sampled_box(&window.codec, id.block as usize);
+        let extent = plan.sampled_box(&window.codec, id.block as usize);
         let samples = to_channel(plan.colour_transform, id, samples, read);
-        let encoded = encoder.block(&window.codec, id, of, &samples).map_err(bug);
+        let encoded = encoder.block(&window.codec, id, extent, &samples).map_err(bug);
         encoders.put(encoder);
         read.put(samples);
         encoded

@@ -1,5 +1,6 @@
 //! Decisions made from the configuration and the archive before any frame is read.
 
+use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::BlockGrid;
@@ -8,7 +9,7 @@ use crate::codec::WindowCodec;
 use crate::codec::bound::Bound;
 use crate::codec::sampled_box::SampledBox;
 use crate::file::promise::UNIT_RANGE;
-use crate::source::{Archive, CHANNELS, ColourTransform};
+use crate::source::{CHANNELS, ColourTransform};
 use crate::wavelet;
 use wavesplat_format::{Basis, Metadata};
 
@@ -53,13 +54,10 @@ impl<'a> Plan<'a> {
         SampledBox { size, known: std::array::from_fn(|a| (start[a] + outer[a]).min(self.blocks.dims[a]) - start[a]) }
     }
 
-    pub(super) fn new(
-        config: &ConvertConfig,
-        archive: &Archive,
-        colour_transform: Option<&'a ColourTransform>,
-    ) -> Result<Self> {
+    pub(super) fn new(input: &'a CodedInput) -> Result<Self> {
+        let CodedInput { config, archive, colour_transform } = input;
         wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
-        check_bound(config, colour_transform.is_some())?;
+        check_bound(input)?;
         if config.chain == 0 {
             return Err(Error::setting("chain", "takes 1 or more windows"));
         }
@@ -78,12 +76,12 @@ impl<'a> Plan<'a> {
                 format!("{edge} voxels a side give more than 2^32 blocks; take larger ones"),
             ));
         }
-        let batch = batch_len(config, blocks, archive, colour_transform)?;
-        Ok(Self { start: start(config, archive, colour_transform, edge), colour_transform, blocks, batch })
+        let batch = batch_len(input, blocks)?;
+        Ok(Self { start: start(input, edge), colour_transform: colour_transform.as_ref(), blocks, batch })
     }
 
     /// The plan of a file that has `count` blocks, side by side.
-    pub(super) fn of_blocks(&self, count: usize) -> Self {
+    pub(super) fn for_blocks(&self, count: usize) -> Self {
         let edge = self.blocks.edges[0];
         let blocks = BlockGrid::cubes([edge * count, edge, edge], edge);
         let start = Metadata { dims: blocks.dims.map(|n| n as u64), ..self.start.clone() };
@@ -100,35 +98,41 @@ impl<'a> Plan<'a> {
 }
 
 /// Checks that the tolerance or error is valid for this bound and these samples.
-fn check_bound(config: &ConvertConfig, coloured: bool) -> Result<()> {
+fn check_bound(input: &CodedInput) -> Result<()> {
+    let config = &input.config;
     let Some(error) = config.max_error else {
         let is_share = (0.0..=1.0).contains(&config.tolerance);
         return is_share.then_some(()).ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
     };
-    let wrong = match config.bound {
-        _ if !(0.0..=f64::MAX).contains(&error) => "takes a finite number of 0 or more, in the samples' unit",
-        _ if coloured => "is in the samples' unit, and colours are coded instead of samples",
-        _ if config.range != Some(UNIT_RANGE) => "is in the samples' unit, so it refers to no range",
-        Bound::Relative { .. } | Bound::Sampled { .. } => "is for a pointwise or rms bound",
+    if !(0.0..=f64::MAX).contains(&error) {
+        return Err(Error::setting("max_error", "takes a finite number of 0 or more, in the samples' unit"));
+    }
+    check_max_error(config.bound, config.range != Some(UNIT_RANGE), input.colour_transform.is_some())
+}
+
+/// Checks that an error in the samples' unit means something beside the other settings.
+pub(super) fn check_max_error(bound: Bound, has_range: bool, has_colours: bool) -> Result<()> {
+    let (setting, what) = match bound {
+        _ if has_colours => ("max_error", "is in the samples' unit, and `transfer_function` codes colours"),
+        _ if has_range => ("range", "the tolerance refers to it, and `max_error` to no range; give one"),
+        Bound::Relative { .. } | Bound::Sampled { .. } => {
+            ("max_error", "needs `bound` pointwise or rms; the others are shares of the samples themselves")
+        }
         Bound::Pointwise | Bound::Rms => return Ok(()),
     };
-    Err(Error::setting("max_error", wrong))
+    Err(Error::setting(setting, what))
 }
 
 /// The metadata before the first frame.
-fn start(
-    config: &ConvertConfig,
-    archive: &Archive,
-    colour_transform: Option<&ColourTransform>,
-    edge: usize,
-) -> Metadata {
+fn start(input: &CodedInput, edge: usize) -> Metadata {
+    let CodedInput { config, archive, colour_transform } = input;
     Metadata {
         dims: archive.grid.dims.map(|n| n as u64),
         spacing: archive.grid.spacing,
         origin: archive.grid.origin,
         sample: archive.sample,
         block_edge: edge as u32,
-        channels: colour_transform.map_or(1, |_| CHANNELS.len() as u16),
+        channels: colour_transform.as_ref().map_or(1, |_| CHANNELS.len() as u16),
         frames: 0,
         times: Vec::new(),
         variable: archive.variable.clone(),
@@ -136,25 +140,21 @@ fn start(
         tolerance: config.tolerance,
         missing_value: config.missing_value,
         windows: Vec::new(),
-        settings: settings::stored_settings(config, archive, colour_transform),
+        settings: settings::stored_settings(input),
         program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
     }
 }
 
 /// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
 /// workers' scratch, and what choosing the next window's scheme takes.
-fn batch_len(
-    config: &ConvertConfig,
-    blocks: BlockGrid,
-    archive: &Archive,
-    colour_transform: Option<&ColourTransform>,
-) -> Result<usize> {
+fn batch_len(input: &CodedInput, blocks: BlockGrid) -> Result<usize> {
+    let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
     let samples = voxels * config.window;
-    let raw = samples
-        * colour_transform.map_or(sample.size(), |colour_transform| colour_transform.sample.size().max(sample.size()));
-    let channel_bytes = colour_transform.map_or(0, |_| samples * sample.size());
+    let largest = |transform: &ColourTransform| transform.sample.size().max(sample.size());
+    let raw = samples * colour_transform.as_ref().map_or(sample.size(), largest);
+    let channel_bytes = colour_transform.as_ref().map_or(0, |_| samples * sample.size());
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
     let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // no pyramid is tried then
     let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };

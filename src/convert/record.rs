@@ -1,7 +1,8 @@
 //! The writer stage: appends coded blocks to the file, and sums up each window.
 
+use super::coded_input::CodedInput;
 use super::warnings::{self, Findings};
-use super::{ConvertConfig, ConvertReport, EncodedBatch, PartialFile, Plan, WindowJob};
+use super::{ConvertConfig, ConvertReport, EncodedBatch, Plan, ResumePoint, Target, WindowJob};
 use crate::base::description::{Description, extended, frames_of, joined, with_frames};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
@@ -14,7 +15,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
 
-pub(super) struct Recorder<'a, W: Write> {
+pub(super) struct WindowWriter<'a, W: Write> {
     name: &'a Path,
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
@@ -37,14 +38,14 @@ struct Descriptions {
 }
 
 impl Descriptions {
-    fn new(archive: &Archive, begun: Option<&PartialFile>) -> Self {
-        let before = begun.and_then(|begun| begun.description.clone());
-        let is_told = begun.is_none_or(|begun| begun.complete.features().described);
+    fn new(archive: &Archive, resume_from: Option<&ResumePoint>) -> Self {
+        let before = resume_from.and_then(|point| point.description.clone());
+        let is_told = resume_from.is_none_or(|point| point.complete.features().described);
         Self { before, added: archive.description.clone().filter(|_| is_told) }
     }
 
     /// The description of the whole file, and the names of the variables left out because some frames lack them.
-    fn of_all(self, frames: u64) -> (Option<Description>, Vec<String>) {
+    fn joined(self, frames: u64) -> (Option<Description>, Vec<String>) {
         let (Some(before), added) = (self.before, self.added.as_ref()) else { return (self.added, Vec::new()) };
         let before = with_frames(before, 1); // if there is no axis of frames, there is one
         let added = added.map(|added| joined(before.clone(), &[with_frames(added.clone(), 1)]));
@@ -55,18 +56,13 @@ impl Descriptions {
     }
 }
 
-impl<'a, W: Write> Recorder<'a, W> {
-    pub(super) fn new(
-        (config, archive): (&'a ConvertConfig, &Archive),
-        plan: &'a Plan<'a>,
-        name: &'a Path,
-        out: W,
-        begun: Option<PartialFile>,
-    ) -> Self {
-        let descriptions = Descriptions::new(archive, begun.as_ref());
-        let frames_before = begun.as_ref().map_or(0, |b| b.complete.metadata().frames);
-        let (writer, out) = match begun {
-            Some(begun) => (Some(Writer::resume(out, begun.complete)), None),
+impl<'a, W: Write> WindowWriter<'a, W> {
+    pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, target: Target<'a, W>) -> Self {
+        let (config, Target { name, out, resume_from }) = (&input.config, target);
+        let descriptions = Descriptions::new(&input.archive, resume_from.as_ref());
+        let frames_before = resume_from.as_ref().map_or(0, |point| point.complete.metadata().frames);
+        let (writer, out) = match resume_from {
+            Some(point) => (Some(Writer::resume(out, point.complete)), None),
             None => (None, Some(out)),
         };
         Self { name, config, plan, writer, out, descriptions, window: None, frames_before, busy: Duration::ZERO }
@@ -113,7 +109,8 @@ impl<'a, W: Write> Recorder<'a, W> {
     pub(super) fn finish(
         mut self,
         started: Instant,
-        (read, findings): (Duration, Findings),
+        read: Duration,
+        findings: &Findings,
         encode: Duration,
     ) -> Result<ConvertReport> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
@@ -122,12 +119,12 @@ impl<'a, W: Write> Recorder<'a, W> {
         };
         let last = Instant::now();
         let metadata = writer.metadata().clone();
-        let (description, not_kept) = std::mem::take(&mut self.descriptions).of_all(metadata.frames);
+        let (description, not_kept) = std::mem::take(&mut self.descriptions).joined(metadata.frames);
         let (mut out, summary) = writer.finish_described(description.as_ref()).map_err(failed)?;
         out.flush().map_err(|e| Error::io(self.name, "writing", e))?;
         self.busy += last.elapsed();
         let report = self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]);
-        let warnings = warnings::warnings(self.config, &report, &findings);
+        let warnings = warnings::warnings(self.config, &report, findings);
         Ok(ConvertReport { typical_variation: findings.variation.median(), warnings, not_kept, ..report })
     }
 

@@ -14,10 +14,12 @@ use crate::source::{Archive, FrameSource, Selection, select};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::Range;
+use std::path::Path;
 use std::str::FromStr;
 
 /// One of several shards.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
 pub struct Shard {
     /// Its number, from 1.
     pub number: usize,
@@ -33,6 +35,14 @@ impl FromStr for Shard {
         let shard =
             parts.map(|(number, of)| Self { number, of }).filter(|shard| (1..=shard.of).contains(&shard.number));
         shard.ok_or_else(|| "takes I/N, the I-th of N shards: 1/8 to 8/8".into())
+    }
+}
+
+impl TryFrom<String> for Shard {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<Self, String> {
+        text.parse()
     }
 }
 
@@ -75,7 +85,8 @@ type Settings = Vec<(String, String)>;
 pub fn sharded(
     source: Box<dyn FrameSource>,
     shard: Shard,
-    (window, chain): (usize, usize),
+    window: usize,
+    chain: usize,
 ) -> Result<(Box<dyn FrameSource>, Settings)> {
     let archive = source.archive();
     let Some(all) = archive.frames else {
@@ -110,12 +121,15 @@ pub struct ArchiveScan {
 
 const SCHEMA: u32 = 1;
 
+/// Most bytes of a scan's file.
+const MOST_BYTES: u64 = 1 << 20;
+
 impl ArchiveScan {
     /// Scans all frames of an archive, or a shard's share of them. `declared` is the value that means "missing".
     ///
     /// # Errors
     /// A stream, or frames that cannot be read.
-    pub fn of(
+    pub fn scan(
         source: &mut dyn FrameSource,
         shard: Option<Shard>,
         declared: Option<f64>,
@@ -178,11 +192,24 @@ impl ArchiveScan {
         serde_json::to_string_pretty(self).map(|text| text + "\n").unwrap_or_default()
     }
 
+    /// Opens the file of a scan.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no scan.
+    pub fn open(path: &Path) -> Result<Self> {
+        let failed = |e| Error::io(path, "reading", e);
+        if path.metadata().map_err(failed)?.len() > MOST_BYTES {
+            return Err(Error::input(path, "is no scan: it is too long"));
+        }
+        let bytes = std::fs::read(path).map_err(failed)?;
+        Self::from_json(&String::from_utf8_lossy(&bytes)).map_err(|what| Error::input(path, what))
+    }
+
     /// Reads the text of a file; the error follows its name.
     ///
     /// # Errors
     /// A text that is no scan, or one of a newer version.
-    pub fn of_json(text: &str) -> std::result::Result<Self, String> {
+    pub fn from_json(text: &str) -> std::result::Result<Self, String> {
         let scan: Self = serde_json::from_str(text).map_err(|e| format!("is no scan: {e}"))?;
         let is_range = scan.range.is_none_or(|(lo, hi)| lo.is_finite() && hi.is_finite() && lo <= hi);
         match scan.schema == SCHEMA && is_range && scan.read[0] <= scan.read[1] && scan.read[1] <= scan.frames {
@@ -259,14 +286,14 @@ mod tests {
         let (a, b, c) = (scan([0, 4], Some((0.0, 2.0))), scan([4, 4], None), scan([4, 10], Some((-1.0, 1.0))));
         let merged = named(&[c.clone(), a.clone(), b.clone()]).expect("all frames");
         assert_eq!(merged, ArchiveScan { missing: 3, ..scan([0, 10], Some((-1.0, 2.0))) });
-        assert_eq!(ArchiveScan::of_json(&merged.to_json()), Ok(merged));
+        assert_eq!(ArchiveScan::from_json(&merged.to_json()), Ok(merged));
         let words = |parts: &[ArchiveScan]| named(parts).expect_err("refused").to_string();
         assert!(words(&[a.clone(), b.clone()]).contains("4..10 are in no scan"));
         assert!(words(&[a.clone(), a.clone(), c.clone()]).contains("have both read"));
         assert!(words(&[a.clone(), scan([5, 10], None)]).contains("leave out frames 4..5"));
         assert!(words(&[a, ArchiveScan { frames: 11, ..c }]).contains("another archive"));
         for text in ["", "{}", "[]", "{\"schema\":1}", "nan"] {
-            assert!(ArchiveScan::of_json(text).is_err(), "{text}");
+            assert!(ArchiveScan::from_json(text).is_err(), "{text}");
         }
     }
 }

@@ -23,8 +23,9 @@ impl Variation {
     /// the grid alone.
     pub(super) fn add_block(
         &mut self,
-        (block, blocks): (usize, usize),
-        of: &SampledBox,
+        block: usize,
+        blocks: usize,
+        extent: &SampledBox,
         ty: SampleType,
         declared: Option<f64>,
         samples: &[u8],
@@ -33,10 +34,10 @@ impl Variation {
             return;
         }
         let each = (VOXELS / blocks).clamp(1, MOST);
-        let [nx, ny, nz] = of.known;
+        let [nx, ny, nz] = extent.known;
         let mut series = Vec::new();
         for voxel in 0..each {
-            let [x, y, z] = evenly(block * each + voxel, of.size);
+            let [x, y, z] = evenly(block * each + voxel, extent.size);
             let at = x + nx * (y + ny * z);
             series.clear();
             for frame in samples.chunks_exact(nx * ny * nz * ty.size()) {
@@ -118,11 +119,11 @@ mod tests {
 
     #[test]
     fn voxels_of_a_block_are_read_at_their_places() {
-        let of = SampledBox { size: [2, 2, 2], known: [3, 2, 2] };
+        let extent = SampledBox { size: [2, 2, 2], known: [3, 2, 2] };
         let frame = |t: u32| (0..12_u32).map(move |i| if i % 3 == 2 { t * 1000 } else { t * 4 } as f32);
         let bytes: Vec<u8> = (0..2).flat_map(frame).flat_map(f32::to_le_bytes).collect();
         let mut found = Variation::default();
-        found.add_block((0, 1), &of, SampleType::F32, None, &bytes);
+        found.add_block(0, 1, &extent, SampleType::F32, None, &bytes);
         assert!((found.median().expect("some change") / 2.0 - 1.0).abs() < 0.07 && found.share_below(2.5) == Some(1.0));
     }
 }

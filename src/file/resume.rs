@@ -14,66 +14,71 @@ use std::io::{self, Read};
 use std::path::Path;
 use wavesplat_format::{CompletePrefix, Error as FormatError, Window};
 
-/// What becomes of the whole windows that an earlier run left unfinished.
+/// What becomes of the whole windows of an earlier run that did not finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Earlier {
+pub enum IfUnfinished {
     /// They are an error, so that they are neither overwritten nor continued by mistake.
-    Refuse,
+    Fail,
     /// They are overwritten.
     Discard,
     /// The run continues after them.
     Resume,
 }
 
-impl Earlier {
+impl IfUnfinished {
     /// What becomes of them with `resume`, or else with `force`.
-    pub fn by(force: bool, resume: bool) -> Self {
+    pub fn from_flags(force: bool, resume: bool) -> Self {
         match (resume, force) {
             (true, _) => Self::Resume,
             (false, true) => Self::Discard,
-            (false, false) => Self::Refuse,
+            (false, false) => Self::Fail,
         }
     }
 
+    /// The whole windows of an unfinished file, if they matter.
+    fn windows(self, part: &Path) -> Result<Option<CompletePrefix>> {
+        if self == Self::Discard { Ok(None) } else { whole_windows(part) }
+    }
+
     /// Returns the finished windows to continue from.
-    fn of(self, held: Option<CompletePrefix>, part: &Path) -> Result<Option<CompletePrefix>> {
+    fn choose(self, held: Option<CompletePrefix>, part: &Path) -> Result<Option<CompletePrefix>> {
         match (self, held) {
             (Self::Resume, held) => Ok(held),
-            (Self::Refuse, Some(held)) => {
+            (Self::Fail, Some(held)) => {
                 let what = format!("holds {} frames of a run that was not finished", held.metadata().frames);
                 Err(Error::path(part, Note::with(what, Remedy::ResumeOrBeginAnew)))
             }
-            (Self::Discard | Self::Refuse, _) => Ok(None),
+            (Self::Discard | Self::Fail, _) => Ok(None),
         }
     }
 }
 
 /// Opens the output file and reads the windows an earlier run finished. With `replace`, a file of that name is replaced
 /// once the output is complete.
-pub fn open(path: &Path, replace: bool, earlier: Earlier) -> Result<(Output, Option<CompletePrefix>)> {
+pub fn open(path: &Path, replace: bool, if_unfinished: IfUnfinished) -> Result<(Output, Option<CompletePrefix>)> {
     let mut out = Output::resumable(path, replace)?;
     let Some(part) = out.part() else {
-        return match earlier {
-            Earlier::Resume => Err(Error::setting("resume", "takes a file to write to, not a pipe or a device")),
+        return match if_unfinished {
+            IfUnfinished::Resume => Err(Error::setting("resume", "takes a file to write to, not a pipe or a device")),
             _ => Ok((out, None)),
         };
     };
-    let held = if earlier == Earlier::Discard { None } else { earlier.of(whole_windows(part)?, part)? };
+    let held = if_unfinished.choose(if_unfinished.windows(part)?, part)?;
     out.begin_at(held.as_ref().map_or(0, CompletePrefix::bytes))?;
     Ok((out, held))
 }
 
 /// Opens the successor of a finished file, which begins with all of its windows. Returns the windows to continue from:
 /// the finished file's, or also those that an earlier run appended.
-pub fn open_successor(of: &CoefficientFile, earlier: Earlier) -> Result<(Output, CompletePrefix)> {
-    let (path, own) = (of.path(), of.whole_windows()?);
+pub fn open_successor(file: &CoefficientFile, if_unfinished: IfUnfinished) -> Result<(Output, CompletePrefix)> {
+    let (path, own) = (file.path(), file.whole_windows()?);
     let mut out = Output::resumable(path, true)?;
-    of.check_unchanged()?; // before it was locked it may have been replaced
+    file.check_unchanged()?; // before it was locked it may have been replaced
     let Some(part) = out.part() else { return Err(Error::input(path, "not a regular file")) };
     let part = part.to_path_buf();
-    let held = if earlier == Earlier::Discard { None } else { whole_windows(&part)? };
-    let of_own = held.as_ref().is_some_and(|held| goes_on(&own, held)); // killed while it was copied
-    match earlier.of(held.filter(|_| !of_own), &part)? {
+    let held = if_unfinished.windows(&part)?;
+    let is_copy = held.as_ref().is_some_and(|held| goes_on(&own, held)); // killed while it was copied
+    match if_unfinished.choose(held.filter(|_| !is_copy), &part)? {
         Some(held) if goes_on(&held, &own) => {
             out.begin_at(held.bytes())?;
             Ok((out, held))

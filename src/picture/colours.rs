@@ -98,7 +98,7 @@ pub(super) fn value_spread(
 }
 
 /// Opens the colours that an option names.
-pub(crate) fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
+pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
     TransferFunction::open(name).map_err(|error| match error {
         Error::Path { path, problem, .. } => Error::usage(format!("{option} {}: {problem}", path.display())),
         other => other,
@@ -123,7 +123,7 @@ pub(crate) fn stretched(
 ///
 /// # Errors
 /// Also if all frames would have to be read, and come from standard input.
-pub(crate) fn colours_of_source(
+pub fn colours_of_source(
     name: &str,
     range: Option<Pair>,
     source: &mut dyn FrameSource,

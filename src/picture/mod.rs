@@ -38,6 +38,6 @@ pub use session::{Inputs, Session};
 pub use view_request::ViewRequest;
 pub use viewer::{Saved, ViewerSession};
 
-pub(crate) use colours::colours_of_source;
+pub use colours::{colours_of_source, open_colours};
 pub(crate) use request::exclude;
 pub(crate) use session::is_coefficient_name;

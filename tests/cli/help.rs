@@ -31,6 +31,19 @@ fn long_help_has_headings() {
 }
 
 #[test]
+fn short_help_has_the_options_that_most_people_need() {
+    let work = Work::new();
+    let (short, long) = (work.wavesplat("convert -h").ok(), work.wavesplat("convert --help").ok());
+    let options = |run: &Run| run.text().lines().filter(|line| line.trim_start().starts_with('-')).count();
+    for words in ["--output", "--tolerance", "--max-error", "--variable", "--dims", "--resume", "\nError bound:"] {
+        assert!(short.text().contains(words), "'{words}' in\n{}", short.text());
+    }
+    assert!(options(&short) < 20 && options(&long) > 40, "{} and {}", options(&short), options(&long));
+    assert!(short.text().ends_with("--help lists all options.\n"), "{}", short.text());
+    assert!(!long.text().contains("lists all options"), "{}", long.text());
+}
+
+#[test]
 fn an_estimate_is_not_reported_as_a_guarantee() {
     let run = Work::new().wavesplat("convert --help").ok();
     let text = run.text().split_whitespace().collect::<Vec<_>>().join(" ");

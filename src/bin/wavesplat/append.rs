@@ -1,16 +1,16 @@
 //! `wavesplat append`
 
-use super::convert::finish;
+use super::convert::report;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat::base::address::refuse_output;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::{STANDARD, part_of};
 use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
-use wavesplat::convert::{ConvertConfig, PartialFile, of_file};
+use wavesplat::convert::{ConvertConfig, append};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::merge::Shards;
-use wavesplat::file::resume::{self, Earlier, begins_with, ends_with, open_successor};
+use wavesplat::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
 use wavesplat::file::shard::frames_of_shard;
 use wavesplat::source::FrameSource;
 
@@ -83,10 +83,11 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
         args.common.note(format_args!("{}: ends with these frames already", args.file.display()));
         return Ok(());
     }
-    let (out, complete) = open_successor(&file, Earlier::by(args.force, args.resume))?;
-    let (first_window, description) = (file.metadata().windows.len(), file.description()?);
-    let begun = PartialFile { complete, first_window, description };
-    finish(source.as_mut(), &config, Some(begun), &path, out, &args.common, &|| file.check_unchanged())
+    let if_unfinished = IfUnfinished::from_flags(args.force, args.resume);
+    let progress = args.common.progress("convert", "blocks");
+    let done = append(source.as_mut(), &config, &file, if_unfinished, &progress);
+    drop(progress); // clears its bar before notes are printed
+    report(done, config.bound, &path, &args.common)
 }
 
 /// Whether all inputs are shards, which are copied; other coefficient files are sources like any other.
@@ -112,8 +113,7 @@ impl AppendArgs {
             return Ok(());
         }
         let shards = Shards::after(file, &self.inputs, &self.common.progress("open", "shards"))?;
-        let earlier = Earlier::by(self.force, self.resume);
-        let (mut out, begun) = open_successor(file, earlier)?;
+        let (mut out, begun) = open_successor(file, IfUnfinished::from_flags(self.force, self.resume))?;
         let progress = self.common.progress("merge", "windows");
         let report = shards.merge(Some(begun), false, (file.path(), &mut out), &progress)?;
         file.check_unchanged()?;
@@ -154,7 +154,7 @@ impl AppendArgs {
     }
 
     fn config(&self, file: &CoefficientFile) -> Result<ConvertConfig> {
-        let config = of_file(file.metadata(), self.common.memory.0);
+        let config = ConvertConfig::from_file(file.metadata(), self.common.memory.0);
         config.ok_or_else(|| Error::input(&self.file, "has no settings of its conversion, so nothing can be appended"))
     }
 }

@@ -6,7 +6,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{CommonArgs, spare_inputs};
 use wavesplat::file::merge::{MergeReport, Shards};
-use wavesplat::file::resume::{self, Earlier};
+use wavesplat::file::resume::{self, IfUnfinished};
 
 /// Join shards into one coefficient file
 #[derive(Debug, Args)]
@@ -45,7 +45,7 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     args.common.start()?;
     spare_inputs(&args.shards, &args.output)?;
     let shards = Shards::open(&args.shards, args.skip_damaged, &args.common.progress("open", "shards"))?;
-    let (mut out, begun) = resume::open(&args.output, args.force, Earlier::by(args.force, args.resume))?;
+    let (mut out, begun) = resume::open(&args.output, args.force, IfUnfinished::from_flags(args.force, args.resume))?;
     let progress = args.common.progress("merge", "windows");
     let report = shards.merge(begun, args.skip_damaged, (&args.output, &mut out), &progress)?;
     out.commit_if(resume::check)?;

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::Output;
 use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
@@ -62,24 +62,11 @@ impl ScanArgs {
     fn scan(&self) -> Result<ArchiveScan> {
         let mut source = self.select.narrow(self.input.open(&self.inputs, &self.common)?)?;
         let missing_value = source.archive().missing_value(self.missing_value);
-        ArchiveScan::of(source.as_mut(), self.shard, missing_value, &self.common.progress("scan", "frames"))
+        ArchiveScan::scan(source.as_mut(), self.shard, missing_value, &self.common.progress("scan", "frames"))
     }
 
     fn merged(&self) -> Result<ArchiveScan> {
-        let named = |path: &PathBuf| Ok((path.display().to_string(), read(path)?));
+        let named = |path: &PathBuf| Ok((path.display().to_string(), ArchiveScan::open(path)?));
         ArchiveScan::merged(&self.inputs.iter().map(named).collect::<Result<Vec<_>>>()?)
     }
-}
-
-/// Most bytes of a scan.
-const MOST_BYTES: u64 = 1 << 20;
-
-/// Reads a scan.
-pub(crate) fn read(path: &Path) -> Result<ArchiveScan> {
-    let failed = |e| Error::io(path, "reading", e);
-    if path.metadata().map_err(failed)?.len() > MOST_BYTES {
-        return Err(Error::input(path, "is no scan: it is too long"));
-    }
-    let bytes = std::fs::read(path).map_err(failed)?;
-    ArchiveScan::of_json(&String::from_utf8_lossy(&bytes)).map_err(|what| Error::input(path, what))
 }

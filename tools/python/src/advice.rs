@@ -4,7 +4,11 @@ use wavesplat::base::error::{Error, Note, Remedy};
 
 /// The words of an error, with advice if there is some.
 pub(crate) fn of_error(error: &Error) -> String {
-    advised(error.to_string(), error.remedy().as_ref())
+    let words = match error {
+        Error::Setting { .. } => error.to_string().replace('`', ""), // around names of arguments
+        other => other.to_string(),
+    };
+    advised(words, error.remedy().as_ref())
 }
 
 /// The words of a note, with advice if there is some.

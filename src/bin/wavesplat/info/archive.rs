@@ -54,7 +54,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     };
     let asked = args.estimate.map(|one| one.map_or(configs(&TOLERANCES), |one| configs(&[one]))).unwrap_or_default();
     let estimates = estimates(source.as_mut(), &asked, &progress)?;
-    let info = Info::of(&archive, estimates, args.estimate.is_some_and(|one| one.is_some()));
+    let info = Info::new(&archive, estimates, args.estimate.is_some_and(|one| one.is_some()));
     if args.common.json {
         return args.common.report(&info, false);
     }
@@ -71,7 +71,7 @@ fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
 }
 
 impl<'a> Info<'a> {
-    fn of(archive: &'a Archive, mut estimates: Vec<Estimate>, single: bool) -> Self {
+    fn new(archive: &'a Archive, mut estimates: Vec<Estimate>, single: bool) -> Self {
         let labels = archive.time_labels();
         let estimate = if single { estimates.pop() } else { None };
         let frame = (archive.grid.whole().voxels() * archive.sample.size()) as u64;

@@ -1,13 +1,13 @@
 //! Describes a coefficient file.
 
-use super::description;
+use super::{description, made_by};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use wavesplat::base::description::Description;
 use wavesplat::base::error::Result;
 use wavesplat::cli::{CommonArgs, print};
-use wavesplat::convert::{Bound, Packing, options};
+use wavesplat::convert::{Bound, Packing};
 use wavesplat::file::promise::range_of_shares;
 use wavesplat::file::report::{BoundReport, WindowReport, largest_bound};
 use wavesplat::file::{CoefficientFile, time_labels};
@@ -51,7 +51,7 @@ struct Info {
     windows: Vec<WindowReport>,
     settings: Vec<(String, String)>,
     /// The options of `wavesplat convert` that reproduce the file, by name.
-    options: BTreeMap<&'static str, String>,
+    options: BTreeMap<String, String>,
     program: String,
     /// The metadata of the source that the file keeps.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,7 +61,7 @@ struct Info {
 }
 
 pub(super) fn run(file: &CoefficientFile, common: &CommonArgs) -> Result<()> {
-    let info = Info::of(file)?;
+    let info = Info::from_file(file)?;
     if common.json {
         return common.report(&info, false);
     }
@@ -69,7 +69,7 @@ pub(super) fn run(file: &CoefficientFile, common: &CommonArgs) -> Result<()> {
 }
 
 impl Info {
-    fn of(file: &CoefficientFile) -> Result<Self> {
+    fn from_file(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
         let voxels: u64 = m.dims.iter().product();
         let windows: Vec<WindowReport> =
@@ -106,7 +106,7 @@ impl Info {
             lost_blocks: (0..windows.len() as u32).flat_map(|w| file.leaves(w)).map(|leaf| leaf.lost).sum(),
             windows,
             settings: m.settings.clone(),
-            options: options(m).into_iter().collect(),
+            options: made_by::options(file),
             program: m.program.clone(),
             description: described.as_ref().map(description::json),
             described,

@@ -3,6 +3,7 @@
 mod archive;
 mod coefficients;
 mod description;
+mod made_by;
 mod variables;
 
 use clap::Args;

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import chain
+from operator import methodcaller
 from os import PathLike
 from typing import Any
 
@@ -25,29 +27,6 @@ SAMPLES = {"u1": "u8", "i1": "i8", "u2": "u16", "i2": "i16", "u4": "u32", "i4": 
     "f8": "f64",
 }
 """The library's names of types of samples."""
-
-
-@dataclass
-class Settings:
-    """Settings of a conversion, as the native half takes them."""
-
-    path: str
-    resume: bool
-    overwrite: bool
-    tolerance: float
-    max_error: float | None
-    bound: str
-    floor: float
-    range: tuple[float, float] | None
-    missing: str | None
-    missing_value: float | None
-    clip: bool
-    window: int
-    chain: int
-    shard: tuple[int, int] | None
-    block: int | None
-    level: int
-    memory: int
 
 
 def convert(
@@ -123,34 +102,26 @@ def convert(
         InputError: Samples are missing, or frames differ in shape or type.
 
     """
-    value = missing if isinstance(missing, (int, float)) and not isinstance(missing, bool) else None
-    given = Settings(
-        path=os.fspath(path),
-        resume=resume,
-        overwrite=overwrite,
-        tolerance=0.01,
-        max_error=None,
-        bound=bound,
-        floor=floor,
-        range=None if range is None else (float(range[0]), float(range[1])),
-        missing=None if value is not None else missing,  # type: ignore[arg-type]
-        missing_value=None if value is None else float(value),
-        clip=clip,
-        window=window,
-        chain=chain,
-        shard=shard,
-        block=block,
-        level=level,
-        memory=memory,
-    )
-    allowed = Allowed(tolerance, max_error)
+    request: dict[str, Any] = {
+        "bound": _bound(bound, floor),
+        "range": None if range is None else [_finite("range", end) for end in (range[0], range[1])],
+        **_missing(missing),
+        "clip": clip,
+        "window": window,
+        "chain": chain,
+        "block": block,
+        "level": level,
+        "memory": memory,
+    }
+    given = Conversion(request, os.fspath(path), resume, overwrite, Allowed(tolerance, max_error))
     if _is_of_xarray(source):
         from ._dataset import convert_dataset
 
         for name, extra in {"times": times, "time_unit": time_unit, "spacing": spacing, "origin": origin}.items():
             if extra is not None:
                 raise ValueError(f"{name}: a Dataset has coordinates of its own; change those with assign_coords")
-        return convert_dataset(source, given, allowed, variable=variable, axes=axes, progress=progress)
+        request["shard"] = _shard(shard, range is not None or max_error is not None)
+        return convert_dataset(source, given, variable=variable, axes=axes, progress=progress)
     if variable is not None or axes is not None or shard is not None:
         raise ValueError("variable, axes and shard are for a Dataset: an array is (time, z, y, x)")
     times, time_unit = _numbers(times, time_unit)
@@ -163,9 +134,9 @@ def convert(
         "times": times,
         "time_unit": time_unit,
     }
-    settings = asdict(allowed.applied(given, None))
+    conversion = given.of_variable(None)
     with reporting(progress, "convert") as report:
-        return told(*_wavesplat.convert_frames(frames.parts, layout, settings, report))
+        return told(*_wavesplat.convert_frames(frames.parts, layout, conversion, report))
 
 
 def merge(
@@ -206,15 +177,73 @@ class Allowed:
     tolerance: float | dict[str, float] | None
     max_error: float | dict[str, float] | None
 
-    def applied(self, settings: Settings, variable: str | None) -> Settings:
-        """Settings with the error allowed for a variable."""
+    def of_variable(self, variable: str | None) -> dict[str, Any]:
+        """The error allowed for a variable, as the library's request has it."""
         if self.tolerance is not None and self.max_error is not None:
             raise ValueError("tolerance is a share of a range, and max_error is in the samples' unit; give one")
-        tolerance, error = (_of_variable(name, getattr(self, name), variable) for name in ("tolerance", "max_error"))
-        exact = 0.0 if error is not None else 0.01
-        return Settings(
-            **{**asdict(settings), "tolerance": exact if tolerance is None else tolerance, "max_error": error}
-        )
+        tolerance = _of_variable("tolerance", self.tolerance, variable)
+        error = _of_variable("max_error", self.max_error, variable)
+        return {
+            "tolerance": None if tolerance is None else _number(tolerance),
+            "max_error": None if error is None else _finite("max_error", error),
+        }
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """What is asked of a conversion, and where it goes."""
+
+    request: dict[str, Any]
+    """The library's ``ConvertRequest``, without the error allowed."""
+    path: str
+    resume: bool
+    overwrite: bool
+    allowed: Allowed
+
+    def of_variable(self, variable: str | None) -> dict[str, Any]:
+        """The conversion of a variable, as the native half takes it."""
+        request = self.request | self.allowed.of_variable(variable)
+        words = json.dumps(request, default=methodcaller("item"))  # of numbers that are numpy's
+        return {"request": words, "path": self.path, "resume": self.resume, "overwrite": self.overwrite}
+
+
+def _number(number: Any) -> float | str:
+    """A number for JSON, which has no NaN."""
+    number = float(number)
+    return number if math.isfinite(number) else repr(number)
+
+
+def _finite(name: str, number: Any) -> float:
+    if not math.isfinite(number):
+        raise ValueError(f"{name}: takes finite numbers")
+    return float(number)
+
+
+def _bound(bound: str, floor: float) -> Any:
+    if bound not in ("pointwise", "rms", "relative"):
+        raise ValueError(f"bound: 'pointwise', 'rms' or 'relative', not \"{bound}\"")
+    return {"relative": {"floor": _finite("floor", floor)}} if bound == "relative" else bound
+
+
+def _missing(missing: str | float | None) -> dict[str, Any]:
+    """What to do with missing samples, and the value that means "missing"."""
+    if isinstance(missing, (int, float)) and not isinstance(missing, bool):
+        return {"missing_value": _number(missing)}
+    if missing not in ("mask", "error", None):
+        raise ValueError(f"missing: 'error' or 'mask', not \"{missing}\"")
+    return {"missing": missing}
+
+
+def _shard(shard: tuple[int, int] | None, knows_range: bool) -> str | None:
+    """A shard in the library's words."""
+    if shard is None:
+        return None
+    number, count = shard
+    if not 1 <= number <= count:
+        raise ValueError(f"shard: takes (I, N), the I-th of N, from (1, {count}) to ({count}, {count})")
+    if not knows_range:
+        raise ValueError("shard: needs range=... or max_error=..., since a shard does not know all frames")
+    return f"{number}/{count}"
 
 
 def _of_variable(name: str, given: float | dict[str, float] | None, variable: str | None) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from . import _wavesplat
-from ._convert import Allowed, Settings, _chunk, frames_together, little_endian, told
+from ._convert import Conversion, _chunk, frames_together, little_endian, told
 from ._progress import Progress, reporting
 
 NAME = "%n"
@@ -23,8 +23,7 @@ _OF_STORAGE = ("units", "calendar", "dtype")
 
 def convert_dataset(
     source: xr.DataArray | xr.Dataset,
-    settings: Settings,
-    allowed: Allowed,
+    conversion: Conversion,
     *,
     variable: str | None,
     axes: str | None,
@@ -33,20 +32,20 @@ def convert_dataset(
     """Converts a variable, or each of several to a file of its own."""
     dataset = _dataset(source)
     names = [variable] if variable is not None else _volumes(dataset)
-    if NAME not in settings.path:
+    if NAME not in conversion.path:
         if len(names) != 1:
             found = ", ".join(names) or "none"
             raise ValueError(
                 f"a file holds one variable with three axes or more, and the dataset has {found}: name one as "
                 f"variable=..., or write each to a file of its own, as in 'run_{NAME}.wspl'"
             )
-        return _one(dataset, names[0], settings, allowed, axes, progress)
+        return _one(dataset, names[0], conversion, axes, progress)
     reports = {}
     for name in names:
-        allowed.applied(settings, name)  # so that none is written if one lacks an entry
+        conversion.allowed.of_variable(name)  # so that none is written if one lacks an entry
     for name in names:
-        of_name = replace(settings, path=settings.path.replace(NAME, name.replace("/", "_")))
-        reports[name] = _one(dataset, name, of_name, allowed, axes, progress)
+        of_name = replace(conversion, path=conversion.path.replace(NAME, name.replace("/", "_")))
+        reports[name] = _one(dataset, name, of_name, axes, progress)
     return reports
 
 
@@ -65,20 +64,21 @@ def _volumes(dataset: xr.Dataset) -> list[str]:
 
 
 def _one(
-    dataset: xr.Dataset, name: str, settings: Settings, allowed: Allowed, axes: str | None, progress: Progress
+    dataset: xr.Dataset, name: str, conversion: Conversion, axes: str | None, progress: Progress
 ) -> dict[str, Any]:
     if name not in dataset.data_vars:
         raise ValueError(f"variable: there is no {name!r}; the dataset has {', '.join(map(str, dataset.data_vars))}")
     encoded, attrs = _encoded(dataset, name)
     unlimited = set(dataset.encoding.get("unlimited_dims", ()))
-    arrays = [_described(key, var, unlimited, settings.memory, key == name) for key, var in encoded.items()]
+    memory = conversion.request["memory"]
+    arrays = [_described(key, var, unlimited, memory, key == name) for key, var in encoded.items()]
 
     def read(array: str, ranges: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
         part = encoded[array][tuple(slice(start, stop) for start, stop in ranges)]
         return little_endian(np.asarray(part.values)).reshape(-1).view(np.uint8)
 
     chosen = {"source": f"dataset ({name})", "variable": name, "axes": axes}
-    of_name = asdict(allowed.applied(settings, name))
+    of_name = conversion.of_variable(name)
     with reporting(progress, f"convert {name}") as report:
         return told(*_wavesplat.convert_arrays(arrays, _attributes(attrs), read, chosen, of_name, report))
 

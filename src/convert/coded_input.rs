@@ -5,18 +5,19 @@ use crate::base::sample;
 use crate::file::promise::UNIT_RANGE;
 use crate::source::{Archive, ColourTransform};
 
-/// A conversion, described for the coded samples.
-pub(super) struct Task {
+/// The samples to code, and how.
+#[derive(Debug, Clone)]
+pub(super) struct CodedInput {
     pub(super) config: ConvertConfig,
     pub(super) archive: Archive,
     /// Converts source samples to coded ones, if they differ.
     pub(super) colour_transform: Option<ColourTransform>,
 }
 
-impl Task {
+impl CodedInput {
     pub(super) fn new(config: &ConvertConfig, archive: &Archive) -> Self {
         let missing_value = sample::missing_value(archive.sample, config.missing_value);
-        let config = in_shares(ConvertConfig { missing_value, ..config.clone() });
+        let config = max_error_as_tolerance(ConvertConfig { missing_value, ..config.clone() });
         let archive = archive.clone();
         let Some(colours) = config.colours.clone() else { return Self { config, archive, colour_transform: None } };
         let colour_transform = ColourTransform { colours, sample: archive.sample, missing_value };
@@ -31,7 +32,7 @@ impl Task {
 }
 
 /// The same bound as a tolerance. An error in the samples' unit is a share of a range of length 1.
-fn in_shares(config: ConvertConfig) -> ConvertConfig {
+fn max_error_as_tolerance(config: ConvertConfig) -> ConvertConfig {
     let Some(tolerance) = config.max_error else { return config };
     ConvertConfig { tolerance, range: config.range.or(Some(UNIT_RANGE)), ..config }
 }

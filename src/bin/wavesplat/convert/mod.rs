@@ -1,0 +1,172 @@
+//! `wavesplat convert`
+
+mod given;
+mod options;
+
+use super::several;
+use clap::{Arg, Args, Command};
+pub(crate) use options::ConvertArgs;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use wavesplat::base::error::{Error, Note, Result};
+use wavesplat::base::output::{Output, STANDARD};
+use wavesplat::cli::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
+use wavesplat::colour::TransferFunction;
+use wavesplat::convert::{Bound, ConvertReport, Failure, run as convert};
+use wavesplat::file::CoefficientFile;
+use wavesplat::file::repack::{RepackReport, repack};
+use wavesplat::file::resume::{self, IfUnfinished};
+use wavesplat::picture::colours_of_source;
+use wavesplat::source::{FrameSource, extensions};
+
+pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
+    args.common.start()?;
+    match several::commands(args)? {
+        Some(commands) => commands.iter().try_for_each(run_one),
+        None => run_one(args),
+    }
+}
+
+fn run_one(args: &ConvertArgs) -> Result<()> {
+    if let Some(file) = args.input.coefficients(&args.inputs, &RemoteArgs::default())? {
+        return args.repack(&file);
+    }
+    let mut request = args.request()?;
+    request.check()?;
+    let mut source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
+    args.check_output()?;
+    let missing_value = source.archive().missing_value(request.missing_value);
+    request.transfer_function = args.colours(source.as_mut(), missing_value)?;
+    let if_unfinished = IfUnfinished::from_flags(args.force, args.resume);
+    let progress = args.common.progress("convert", "blocks");
+    let done = convert(source, &request, &args.output, args.force, if_unfinished, &progress);
+    drop(progress); // clears its bar before notes are printed
+    let Some(done) = done.transpose() else {
+        args.common.note(format_args!("{}: is complete already", args.output.display()));
+        return Ok(());
+    };
+    report(done, request.bound, &args.output, &args.common)
+}
+
+/// Reports what a conversion did, or what it left.
+pub(crate) fn report(
+    done: std::result::Result<ConvertReport, Failure>,
+    bound: Bound,
+    output: &Path,
+    common: &CommonArgs,
+) -> Result<()> {
+    let report = done.map_err(|Failure { error, kept }| {
+        if let Some(part) = kept {
+            common
+                .note(format_args!("{}: the finished windows are kept; --resume continues after them", part.display()));
+        }
+        error
+    })?;
+    common.note(summary(&report, bound));
+    report.warnings.iter().for_each(|warning| common.note(format_args!("warning: {}", note_text(warning))));
+    common.report(&Reported::new(&report), output == Path::new(STANDARD))
+}
+
+/// The keys of `--json`.
+#[derive(Serialize)]
+struct Reported<'a> {
+    #[serde(flatten)]
+    report: &'a ConvertReport,
+    warnings: Vec<Warning<'a>>,
+}
+
+/// What is worth knowing, and what to type.
+#[derive(Serialize)]
+struct Warning<'a> {
+    text: &'a str,
+    remedy: Option<String>,
+}
+
+impl<'a> Reported<'a> {
+    fn new(report: &'a ConvertReport) -> Self {
+        let warning =
+            |note: &'a Note| Warning { text: &note.text, remedy: note.remedy.as_ref().map(|r| advice(r).into()) };
+        Self { report, warnings: report.warnings.iter().map(warning).collect() }
+    }
+}
+
+/// Options of its own that matter for a coefficient file, too.
+const OF_COEFFICIENTS: [&str; 4] = ["output", "force", "chain", "level"];
+
+impl ConvertArgs {
+    /// An error if the output would replace an input, or has the extension of a format of frames, which would mislead
+    /// readers of the file.
+    fn check_output(&self) -> Result<()> {
+        spare_inputs(&self.inputs, &self.output)?;
+        let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+        if !extensions().any(|known| known == extension) {
+            return Ok(());
+        }
+        let what =
+            format!("a coefficient file is named .wspl, not .{extension}; wavesplat extract writes other formats");
+        Err(Error::usage(format!("{}: {what}", self.output.display())))
+    }
+
+    /// The colours for samples, if samples are turned into colours.
+    fn colours(&self, source: &mut dyn FrameSource, missing_value: Option<f64>) -> Result<Option<TransferFunction>> {
+        let Some(name) = &self.transfer_function else { return Ok(None) };
+        spare_inputs(&[PathBuf::from(name)], &self.output)?;
+        let is_piped = self.inputs == [Path::new(STANDARD)];
+        colours_of_source(name, self.range, source, is_piped, missing_value, &self.common).map(Some)
+    }
+
+    /// Rewrites a coefficient file in this version's format.
+    fn repack(&self, file: &CoefficientFile) -> Result<()> {
+        self.refuse_for_coefficients(file.path())?;
+        self.check_output()?;
+        let mut out = Output::create(&self.output, self.force)?;
+        let progress = self.common.progress("convert", "blocks");
+        let report = repack(file, (self.level, self.common.memory.0), &self.output, &mut out, &progress)?;
+        out.commit_if(resume::check)?;
+        let RepackReport { frames, input_bytes, output_bytes, .. } = report;
+        self.common.note(format_args!("{frames} frames, {input_bytes} -> {output_bytes} bytes, with the same samples"));
+        self.common.report(&report, self.output == Path::new(STANDARD))
+    }
+
+    /// An error if an option is given that has no effect on a coefficient file.
+    fn refuse_for_coefficients(&self, path: &Path) -> Result<()> {
+        let others = CommonArgs::augment_args(InputArgs::augment_args(Command::new("")));
+        let is_other = |arg: &Arg| others.get_arguments().any(|other| other.get_id() == arg.get_id());
+        let command = Self::augment_args(Command::new(""));
+        let changed = command.get_arguments().filter(|arg| self.given.changes(arg) && !is_other(arg));
+        match changed.filter_map(Arg::get_long).find(|name| !OF_COEFFICIENTS.contains(name)) {
+            Some(name) => Err(Error::usage(format!(
+                "{}: is a coefficient file, whose samples stay as they are; --{name} is for frames",
+                path.display()
+            ))),
+            None => self.input.refuse_for_coefficients(),
+        }
+    }
+}
+
+fn summary(r: &ConvertReport, bound: Bound) -> String {
+    let ratio = r.input_bytes as f64 / r.output_bytes as f64;
+    let new = (r.frames - r.frames_before) as f64 / r.frames as f64;
+    let rate = new * r.input_bytes as f64 / r.seconds / 1e6;
+    let unit = r.promise.units.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+    let errors = match bound {
+        Bound::Pointwise => format!("largest error {:.4e} of {:.4e}{unit} allowed", r.reached, r.delta),
+        Bound::Relative { .. } => {
+            let tolerance = r.promise.tolerance;
+            let relative = r.share * tolerance;
+            format!(
+                "largest relative error {relative:.4e} of {tolerance:.4e} allowed, largest error {:.4e}{unit}",
+                r.reached
+            )
+        }
+        Bound::Rms | Bound::Sampled { .. } => {
+            format!("rms error of every series within {:.4e}, largest single error {:.4e}{unit}", r.delta, r.reached)
+        }
+    };
+    let estimate = r.promise.caution();
+    let before = if r.frames_before > 0 { format!(", {} of them from before", r.frames_before) } else { String::new() };
+    format!(
+        "{} frames{before}, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}{estimate}",
+        r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample
+    )
+}

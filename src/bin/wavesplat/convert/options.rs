@@ -1,0 +1,312 @@
+//! The options of `wavesplat convert`, and the request that they make.
+
+use super::given::GivenOptions;
+use clap::{Arg, Args, ValueEnum};
+use std::path::PathBuf;
+use wavesplat::base::error::{Error, Result};
+use wavesplat::cli::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
+use wavesplat::convert::shard::Shard;
+use wavesplat::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
+use wavesplat::picture::open_colours;
+use wavesplat::source::extensions;
+
+/// Convert frames to a coefficient file
+#[derive(Debug, Clone, Args)]
+#[command(
+    before_help = "\
+Examples:
+  wavesplat convert frames/ -o run.wspl
+  wavesplat convert 'frames/step_*.vti' -o run.wspl --tolerance 0.001
+  wavesplat convert run.raw --dims 256x256x128x400 --dtype f32 -o run.wspl
+  simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
+  wavesplat convert frames/ -o run.wspl --resume
+  wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
+  wavesplat convert run.nc -o run_%n.wspl --variable u,v,w
+  wavesplat convert old.wspl -o new.wspl
+  wavesplat convert frames/ --scan scan.json --shard 3/16 -o part-3.wspl",
+    after_help = "--help lists all options.",
+    after_long_help = after_help(),
+    mut_args(hidden_in_short_help)
+)]
+pub(crate) struct ConvertArgs {
+    #[command(flatten)]
+    pub(super) given: GivenOptions, // before the others take their values
+    /// Frames: files in order, a folder, a pattern in quotes, one 4-D file, or - for standard input; or a coefficient
+    /// file, to repack it in this version's format, with the same samples
+    #[arg(required = true)]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// Coefficient file to write, or - for standard output. With several variables, %n in the name becomes the
+    /// variable's name
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub(crate) output: PathBuf,
+    /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
+    #[arg(long, help_heading = "Output")]
+    pub(super) force: bool,
+    /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run
+    #[arg(long, help_heading = "Output")]
+    pub(super) resume: bool,
+    /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit [default: 0.01]
+    #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    tolerance: Option<f64>,
+    /// Largest allowed error in the samples' unit, instead of --tolerance, for --bound pointwise and rms; 0 keeps every
+    /// bit. NAME=X,NAME=X gives one for each variable
+    #[arg(long, value_name = "X", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    max_error: Option<MaxError>,
+    /// Error that the tolerance limits
+    #[arg(long, value_enum, default_value = "pointwise", help_heading = ERROR_BOUND)]
+    bound: BoundName,
+    /// Value range that the tolerance refers to, instead of the range of the frames so far; for --bound pointwise and
+    /// rms. With --transfer-function: the values of its first and last colour [default: its own, or the range of all
+    /// frames]
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    pub(super) range: Option<Pair>,
+    /// What to do with NaN, infinities and the missing value: reject them, or keep them as they are [default: error;
+    /// mask with --missing-value, and for files that declare a missing value]
+    #[arg(long, value_enum, help_heading = ERROR_BOUND)]
+    missing: Option<MissingName>,
+    /// Clamp decoded samples to the window's original minimum and maximum, so that non-negative data stay non-negative.
+    /// Pictures from coefficients are not affected
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value = "false", hide_default_value = true, hide_possible_values = true, action = clap::ArgAction::Set, help_heading = ERROR_BOUND)]
+    clip: bool,
+    /// A value that means "missing"
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    missing_value: Option<f64>,
+    /// For --bound relative: samples smaller than this may be off by as much as a sample of this size. Choose the
+    /// magnitude below which values do not matter. With 0, zeros must come back as zeros, and values near zero take most
+    /// of the file [default: 0]
+    #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    floor: Option<f64>,
+    /// For --bound sampled: number of random pixels on each of three faces [default: 300]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    samples: Option<u32>,
+    /// For --bound sampled: seed of the random pixels [default: 0]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    pub(super) select: SelectArgs,
+    /// Convert only the I-th of N shards, each a run of whole windows; wavesplat merge joins them. Needs --scan,
+    /// --range or --max-error
+    #[arg(long, value_name = "I/N", help_heading = SHARDS)]
+    shard: Option<Shard>,
+    /// File written by wavesplat scan: the value range of all frames, which the tolerance refers to
+    #[arg(long, value_name = "FILE", help_heading = SHARDS)]
+    scan: Option<PathBuf>,
+    /// Number of consecutive windows that may reuse the previous window's coding. A shard is a whole number of such
+    /// chains, so a smaller number allows more shards but converts more slowly
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024), help_heading = SHARDS)]
+    chain: u32,
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    /// Convert every sample to a colour first, and store red, green and blue, 0 to 1: a colour map's name or a transfer
+    /// function's file. The tolerance is then a share of full brightness
+    #[arg(long, value_name = "F", help_heading = CODING)]
+    pub(super) transfer_function: Option<String>,
+    /// Transform along time
+    #[arg(long, value_enum, default_value = "auto", help_heading = CODING)]
+    basis: BasisName,
+    /// Prediction of coefficients in space [default: none for haar and multi, else auto]
+    #[arg(long, value_enum, help_heading = CODING)]
+    space: Option<SpaceName>,
+    /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
+    #[arg(long, value_name = "T", help_heading = CODING)]
+    window: Option<usize>,
+    /// Block edge in voxels [default: up to 48, up to 32 without a pyramid; less for long windows]
+    #[arg(long, value_name = "N", help_heading = CODING)]
+    block: Option<usize>,
+    /// Compression level of zstd
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=19), help_heading = CODING)]
+    pub(super) level: i32,
+    #[command(flatten)]
+    pub(crate) common: CommonArgs,
+}
+
+/// The options that `-h` shows: those that most people need. `--help` shows all.
+const IN_SHORT_HELP: [&str; 13] = [
+    "inputs",
+    "output",
+    "force",
+    "resume",
+    "tolerance",
+    "max_error",
+    "missing_value",
+    "frames",
+    "dims",
+    "dtype",
+    "variable",
+    "threads",
+    "memory",
+];
+
+/// Hides most options in the short help. Man pages leave out the text of a hidden option, unless it is a long one.
+fn hidden_in_short_help(arg: Arg) -> Arg {
+    if IN_SHORT_HELP.contains(&arg.get_id().as_str()) {
+        return arg;
+    }
+    let help = arg.get_help().cloned().unwrap_or_default();
+    arg.hide_short_help(true).long_help(help)
+}
+
+/// The headings of the help.
+const ERROR_BOUND: &str = "Error bound";
+const SHARDS: &str = "Several machines";
+const CODING: &str = "How it is coded (the defaults are good)";
+
+/// The end of the help.
+fn after_help() -> String {
+    let extensions: Vec<String> = extensions().map(|ending| format!(".{ending}")).collect();
+    format!("Inputs: {}; headerless data with --dims and --dtype.\n\n{NOTES}", extensions.join(" "))
+}
+
+const NOTES: &str = "\
+A stopped or killed run leaves its finished windows in run.wspl.part; run.wspl itself appears only when it is complete. \
+With --resume, the same command continues there (converted frames are read again and compared); a program that writes into a \
+pipe must start from its first frame again.
+
+The bound of each window is tolerance x (max - min of all frames up to its end), so a pipe needs no second pass; \
+--range sets a fixed range instead. --bound relative refers to each sample itself: for fields above the floor, every pixel of \
+every view is then within the tolerance of its own value, plus the error of splatting (a share of the range: \
+wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE: pixels darker \
+than the mean, and single frames, may be off by many times the tolerance.";
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum BasisName {
+    /// Haar wavelets
+    Haar,
+    /// The multiwavelet of Geronimo, Hardin and Massopust
+    Multi,
+    /// Orthonormal functions learned from the window's own series
+    Learned,
+    /// No transform along time: samples are predicted in space and time
+    Pyramid,
+    /// learned or pyramid, whichever variant makes a few sample boxes of the window smallest
+    Auto,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SpaceName {
+    /// No prediction: each series by itself
+    None,
+    /// From two neighbours along an axis
+    Linear,
+    /// From four neighbours along an axis
+    Cubic,
+    /// linear or cubic, whichever makes a few sample boxes smaller
+    Auto,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum BoundName {
+    /// Every sample: error <= tolerance x value range
+    Pointwise,
+    /// The root mean square of each voxel's errors in each window <= tolerance x value range
+    Rms,
+    /// Every sample v: error <= tolerance x max(|v|, floor)
+    Relative,
+    /// The paper's rule, AN ESTIMATE, NOT A GUARANTEE: as rms, but relative to the mean absolute value of random
+    /// pixels. The relative error of most pixels, but not all, stays below the tolerance
+    Sampled,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MissingName {
+    /// Reject the input, and name the first one
+    Error,
+    /// Keep them; they add nothing to pictures
+    Mask,
+}
+
+impl ConvertArgs {
+    /// What these options ask for.
+    pub(super) fn request(&self) -> Result<ConvertRequest> {
+        let colours = self.transfer_function.as_deref().map(|name| open_colours("--transfer-function", name));
+        Ok(ConvertRequest {
+            tolerance: self.tolerance,
+            max_error: self.max_error.clone(),
+            bound: self.bound()?,
+            range: self.range()?,
+            missing: self.missing.map(|missing| match missing {
+                MissingName::Error => MissingPolicy::Error,
+                MissingName::Mask => MissingPolicy::Mask,
+            }),
+            missing_value: self.missing_value,
+            clip: self.clip,
+            transfer_function: colours.transpose()?,
+            basis: self.basis(),
+            space: self.space()?,
+            window: self.window,
+            block: self.block,
+            level: self.level,
+            chain: self.chain as usize,
+            shard: self.shard,
+            scan: self.scan.clone(),
+            memory: self.common.memory.0,
+            input: self.settings(),
+        })
+    }
+
+    fn bound(&self) -> Result<Bound> {
+        if self.floor.is_some() && !matches!(self.bound, BoundName::Relative) {
+            return Err(Error::usage("--floor: needs --bound relative"));
+        }
+        if (self.samples.is_some() || self.seed.is_some()) && !matches!(self.bound, BoundName::Sampled) {
+            return Err(Error::usage("--samples and --seed: need --bound sampled"));
+        }
+        let floor = self.floor.unwrap_or(0.0);
+        if !(floor.is_finite() && floor >= 0.0) {
+            return Err(Error::usage("--floor: takes a finite number of 0 or more, in the units of the samples"));
+        }
+        Ok(match self.bound {
+            BoundName::Pointwise => Bound::Pointwise,
+            BoundName::Rms => Bound::Rms,
+            BoundName::Relative => Bound::Relative { floor: floor.abs() }, // no -0
+            BoundName::Sampled => {
+                Bound::Sampled { samples: self.samples.unwrap_or(SAMPLES), seed: self.seed.unwrap_or(0) }
+            }
+        })
+    }
+
+    /// The range that the tolerance refers to.
+    fn range(&self) -> Result<Option<(f64, f64)>> {
+        let Some(Numbers([lo, hi])) = self.range.filter(|_| self.transfer_function.is_none()) else { return Ok(None) };
+        let refers_to = match self.bound {
+            BoundName::Relative => "relative the tolerance refers to each sample",
+            BoundName::Sampled => "sampled the tolerance refers to pixels",
+            BoundName::Pointwise | BoundName::Rms => return Ok(Some((lo, hi))),
+        };
+        Err(Error::usage(format!("--range: with --bound {refers_to}, not to a range")))
+    }
+
+    fn basis(&self) -> Option<Basis> {
+        match self.basis {
+            BasisName::Haar => Some(Basis::Haar),
+            BasisName::Multi => Some(Basis::Multi),
+            BasisName::Learned => Some(Basis::Learned),
+            BasisName::Pyramid => Some(Basis::Samples),
+            BasisName::Auto => None,
+        }
+    }
+
+    fn space(&self) -> Result<Option<SpatialPredictor>> {
+        Ok(match self.space {
+            None => None,
+            Some(SpaceName::None) if matches!(self.basis, BasisName::Pyramid | BasisName::Auto) => {
+                return Err(Error::usage("--space none: takes --basis haar, multi or learned"));
+            }
+            Some(SpaceName::None) => Some(SpatialPredictor::Alone),
+            Some(SpaceName::Linear) => Some(SpatialPredictor::Pyramid(Stencil::Linear)),
+            Some(SpaceName::Cubic) => Some(SpatialPredictor::Pyramid(Stencil::Cubic)),
+            Some(SpaceName::Auto) => Some(SpatialPredictor::Any),
+        })
+    }
+
+    /// The settings that `append` and `verify --against` need to read the same samples again.
+    fn settings(&self) -> Vec<(String, String)> {
+        let frames = self.select.frames.map(|f| ("frames".to_string(), f.to_string()));
+        let region = self.select.region.map(|r| ("region".to_string(), r.to_string()));
+        let given = [frames, region].into_iter().flatten();
+        given.chain(self.input.settings().map(|(name, value)| (name.to_string(), value))).collect()
+    }
+}
+
+/// The default number of pixels on each face, as in the paper.
+const SAMPLES: u32 = 300;
