@@ -5,8 +5,8 @@ use crate::base::address::{is_address, public_name};
 use crate::base::error::Result;
 use crate::base::mapped::Access;
 use crate::file::CoefficientFile;
+use crate::formats;
 use crate::remote::{self, Cache, RemoteFile, RemoteOptions};
-use crate::source;
 use clap::Args;
 use std::ffi::{OsStr, OsString};
 use std::fmt;
@@ -114,5 +114,5 @@ fn seconds(text: &str) -> std::result::Result<f64, String> {
 pub(crate) fn is_coefficient_name(path: &Path) -> bool {
     let name = public_name(path);
     let ending = name.extension().and_then(OsStr::to_str).unwrap_or_default();
-    ending == "wspl" || is_address(path) && !source::extensions().any(|of_frames| of_frames == ending)
+    ending == "wspl" || is_address(path) && !formats::extensions().any(|of_frames| of_frames == ending)
 }

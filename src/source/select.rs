@@ -87,7 +87,7 @@ impl FrameWindow for SelectedWindow {
 }
 
 /// Every `step`-th frame of a window from its first, at most `count` of them.
-pub(super) fn stepped(window: Box<dyn FrameWindow>, count: usize, step: usize) -> Box<dyn FrameWindow> {
+pub(crate) fn stepped(window: Box<dyn FrameWindow>, count: usize, step: usize) -> Box<dyn FrameWindow> {
     let frames = window.frames().div_ceil(step).min(count);
     Box::new(SteppedWindow { window, frames, step })
 }

@@ -62,7 +62,7 @@ impl RegularTimes {
     }
 
     /// The times of frames.
-    pub(super) fn times(self, frames: Range<usize>) -> Vec<f64> {
+    pub(crate) fn times(self, frames: Range<usize>) -> Vec<f64> {
         frames.map(|frame| self.at(frame)).collect()
     }
 }
@@ -77,7 +77,7 @@ impl fmt::Display for RegularTimes {
 ///
 /// # Errors
 /// Why that cannot be: a sentence that follows the name of the file.
-pub(super) fn onto_clock(file: &mut FileHeader, first: &Units) -> std::result::Result<(), String> {
+pub(crate) fn onto_clock(file: &mut FileHeader, first: &Units) -> std::result::Result<(), String> {
     let converted = clock(&file.units).and_then(|own| own.convert(&mut file.times, clock(first)?));
     let refused =
         |why| format!("has times in {}, but the first file in {}: {why}", counted(&file.units), counted(first));
@@ -95,7 +95,7 @@ fn clock(units: &Units) -> std::result::Result<Clock, String> {
 }
 
 /// Puts the user's times in place of those of the files, and the files' onto the clock of an earlier archive.
-pub(super) fn settle(archive: &mut Archive, options: &OpenOptions) -> Result<()> {
+pub(crate) fn settle(archive: &mut Archive, options: &OpenOptions) -> Result<()> {
     if let Some(given) = &options.times {
         (archive.units.times, archive.units.calendar) = (None, None);
         match (given, archive.frames) {

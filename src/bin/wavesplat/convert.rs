@@ -19,7 +19,8 @@ use wavesplat::convert::{
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::repack::{RepackReport, repack};
 use wavesplat::file::resume::{self, Earlier};
-use wavesplat::source::{Archive, FrameSource, extensions};
+use wavesplat::formats::extensions;
+use wavesplat::source::{Archive, FrameSource};
 
 /// Convert frames to a coefficient file
 #[derive(Debug, Clone, Args)]

@@ -15,7 +15,8 @@ use wavesplat::convert::shard::{Shard, sharded};
 use wavesplat::convert::{Bound as ErrorBound, ConvertConfig, ConvertReport, MissingPolicy, PartialFile, open_partial};
 use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::{self, Earlier};
-use wavesplat::source::{self, FrameSource, GivenTimes, NamedArrays, OpenOptions};
+use wavesplat::formats::{self, NamedArrays};
+use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
 use wavesplat::{Error, Result};
 
 /// Settings of a conversion, and where it goes.
@@ -181,7 +182,7 @@ pub(crate) fn convert_frames(
     let times = times.map(|times| GivenTimes::List(times.into()));
     let (dims, memory) = (Some(dims), settings.memory / SHARE);
     let options = OpenOptions { dims, sample, spacing, origin, times, time_unit, memory, ..OpenOptions::default() };
-    let open = |caller| source::open_stream(FrameReader::new(iterator, caller), &options);
+    let open = |caller| formats::open_stream(FrameReader::new(iterator, caller), &options);
     settings.run(py, open, report.as_ref())
 }
 
@@ -213,7 +214,7 @@ pub(crate) fn convert_arrays(
     let options = OpenOptions { variable, axes, memory: settings.memory / SHARE, ..OpenOptions::default() };
     let open = |caller| {
         let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
-        source::open_arrays(Path::new(&name), &arrays, &options)
+        formats::open_arrays(Path::new(&name), &arrays, &options)
     };
     settings.run(py, open, report.as_ref())
 }
