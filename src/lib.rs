@@ -17,7 +17,7 @@
 //! # Ok::<(), wavesplat::Error>(())
 //! ```
 //!
-//! [`formats::open`] opens files instead: NRRD, NIfTI, VTK, HDF5, NetCDF, raw bytes and more.
+//! [`formats::open()`] opens files instead: NRRD, NIfTI, VTK, HDF5, NetCDF, raw bytes and more.
 //!
 //! Render all frames of a view to PNG files:
 //!
@@ -122,7 +122,7 @@
 //!
 //! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `formats` and
 //!   `codec`; then `file`; then `convert`, `render` and `extract`; then `cli`; then the programs.
-//! - `convert`, `render` and `extract` do not use each other. They meet in the coefficient file.
+//! - `convert`, `render` and `extract` do not use each other: they meet in the coefficient file. Nor do `formats` and `codec`.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
 //! - All `unsafe` code is in `base/mapped.rs`.
 //!

@@ -29,15 +29,15 @@ pub(crate) fn payload(ty: SampleType, frames: std::ops::Range<usize>, big_endian
 /// Boxes of every kind: whole, whole rows, whole planes, single voxels, inner ones, empty.
 fn regions() -> Vec<Region> {
     let [x, y, z] = DIMS;
-    let of = |start, end| Region { start, end };
+    let region = |start, end| Region { start, end };
     vec![
-        of([0, 0, 0], DIMS),
-        of([0, 0, 1], [x, y, 2]),
-        of([0, 1, 0], [x, 3, z]),
-        of([1, 0, 0], [2, y, z]),
-        of([2, 1, 1], [6, 4, 3]),
-        of([x - 1, y - 1, z - 1], DIMS),
-        of([3, 3, 1], [3, 3, 1]),
+        region([0, 0, 0], DIMS),
+        region([0, 0, 1], [x, y, 2]),
+        region([0, 1, 0], [x, 3, z]),
+        region([1, 0, 0], [2, y, z]),
+        region([2, 1, 1], [6, 4, 3]),
+        region([x - 1, y - 1, z - 1], DIMS),
+        region([3, 3, 1], [3, 3, 1]),
     ]
 }
 

@@ -44,7 +44,7 @@ impl RegularTimes {
 
     /// The times of every `every`-th frame from `first` on.
     #[must_use]
-    pub fn of(self, first: usize, every: usize) -> Self {
+    pub fn stepped(self, first: usize, every: usize) -> Self {
         let first = first.saturating_mul(self.every).saturating_add(self.first);
         Self { first, every: every.saturating_mul(self.every), ..self }
     }
@@ -189,7 +189,7 @@ mod tests {
     fn regular_times_of_some_frames_are_those_of_all() {
         let all = RegularTimes::new(0.5, 0.1).expect("a step");
         let times = all.times(0..100);
-        let some = all.of(3, 4).of(2, 5);
+        let some = all.stepped(3, 4).stepped(2, 5);
         assert_eq!(some.times(0..4), [11, 31, 51, 71].map(|frame| times[frame]));
         assert_eq!(some.after(some.at(3), 20).times(0..1), [times[91]]);
         assert_eq!(all.after(times[41], 1).times(0..50), times[42..92]);

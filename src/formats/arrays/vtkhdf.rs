@@ -68,8 +68,8 @@ impl Image {
 
     /// Points along x, y, z; 0 where the extent makes no sense.
     fn points(&self) -> [usize; 3] {
-        let of = |a: usize| self.extent[2 * a + 1].saturating_sub(self.extent[2 * a]).saturating_add(1);
-        std::array::from_fn(|a| usize::try_from(of(a)).unwrap_or(0))
+        let length = |a: usize| self.extent[2 * a + 1].saturating_sub(self.extent[2 * a]).saturating_add(1);
+        std::array::from_fn(|a| usize::try_from(length(a)).unwrap_or(0))
     }
 
     /// Which of an array's frames each step has.

@@ -41,8 +41,9 @@ impl Axes {
             return Err(format!("space directions must be {axes} vectors or none, not {found}"));
         }
         let counts = counts(header, axes, directions.as_deref())?;
-        let of = |what| (0..axes).filter(|axis| counts[*axis] == what).collect::<Vec<_>>();
-        let (voxels, frames, components) = (of(AxisKind::Voxels), of(AxisKind::Frames), of(AxisKind::Components));
+        let numbers_of = |kind| (0..axes).filter(|axis| counts[*axis] == kind).collect::<Vec<_>>();
+        let (voxels, frames, components) =
+            (numbers_of(AxisKind::Voxels), numbers_of(AxisKind::Frames), numbers_of(AxisKind::Components));
         let (&[x, y, z], [] | [_], [] | [_]) = (&voxels[..], &frames[..], &components[..]) else {
             let found =
                 format!("{} of space, {} of frames, {} of components", voxels.len(), frames.len(), components.len());
