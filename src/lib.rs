@@ -17,7 +17,7 @@
 //! # Ok::<(), wavesplat::Error>(())
 //! ```
 //!
-//! [`source::open`] opens files instead: NRRD, NIfTI, VTK, HDF5, NetCDF, raw bytes and more.
+//! [`formats::open()`] opens files instead: NRRD, NIfTI, VTK, HDF5, NetCDF, raw bytes and more.
 //!
 //! Render all frames of a view to PNG files:
 //!
@@ -75,7 +75,8 @@
 //! | `base` | errors, grids, samples, mapped files, output files |
 //! | `colour` | transfer functions, and the colours of pixels |
 //! | `remote` | files behind `https://` and `s3://`: requests, pages that are kept, a cache |
-//! | `source` | input formats behind one trait: frames in order, a window at a time |
+//! | `source` | frames in order behind one trait, a window at a time |
+//! | `formats` | formats of files, for both directions: headers of inputs, and of extracted samples |
 //! | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
 //! | `codec` | one block: samples to codes under the error bound, and back |
 //! | `file` | the coefficient file: open, verify, recover, continue |
@@ -120,9 +121,10 @@
 //!
 //! A test reads the sources and checks these rules.
 //!
-//! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `codec`; then
-//!   `file`; then `convert`, `render` and `extract`; then `picture`; then `cli`; then the programs.
-//! - `convert`, `render` and `extract` do not use each other. They meet in the coefficient file.
+//! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `formats` and
+//!   `codec`; then `file`; then `convert`, `render` and `extract`; then `picture`;
+//!   then `cli`; then the programs.
+//! - `convert`, `render` and `extract` do not use each other: they meet in the coefficient file. Nor do `formats` and `codec`.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
 //! - All `unsafe` code is in `base/mapped.rs`.
 //!
@@ -148,6 +150,7 @@ pub mod base;
 pub mod colour;
 pub mod remote;
 pub mod source;
+pub mod formats;
 mod wavelet;
 mod codec;
 pub mod file;

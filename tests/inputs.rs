@@ -8,7 +8,8 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::load;
-use wavesplat::source::{Archive, FrameSource, OpenOptions, open};
+use wavesplat::formats::open;
+use wavesplat::source::{Archive, FrameSource, OpenOptions};
 
 /// A case of `manifest.json`.
 #[derive(Debug, Clone, Deserialize)]

@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::Basis;
 use wavesplat::file::verify::verify;
+use wavesplat::formats::open;
 use wavesplat::render::{CoefficientScene, FrameScene, Quantity, SplatSource};
-use wavesplat::source::{FrameSource, OpenOptions, open};
+use wavesplat::source::{FrameSource, OpenOptions};
 
 fn plate() -> Option<Box<dyn FrameSource>> {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "shared", "data", "plate_jz.npy"].iter().collect();

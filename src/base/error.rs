@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 ///
 /// ```
 /// use wavesplat::base::error::{Error, Remedy};
-/// use wavesplat::source::{OpenOptions, open};
+/// use wavesplat::formats::open;
+/// use wavesplat::source::OpenOptions;
 ///
 /// let dims = Some(vec![4, 4]);
 /// match open(&["run.raw".into()], &OpenOptions { dims, ..OpenOptions::default() }) {

@@ -74,11 +74,7 @@ fn samples(descr: &Literal<'_>) -> Result<Result<(StoredType, bool), String>, St
 
 fn sample_type(name: &str) -> Option<(StoredType, bool)> {
     let (order, name) = name.split_at_checked(1)?;
-    let ty = match name {
-        "i8" => StoredType::I64, // in bytes
-        "u8" => StoredType::U64,
-        name => SampleType::ALL.into_iter().find(|ty| numpy_name(*ty) == name)?.into(),
-    };
+    let ty = StoredType::all().find(|ty| numpy_name(*ty) == name)?;
     let is_known = matches!(order, "<" | ">") || order == "|" && ty.size() == 1;
     is_known.then_some((ty, order == ">"))
 }
@@ -97,7 +93,8 @@ fn shape(literal: &Literal<'_>) -> Result<Vec<u64>, String> {
 }
 
 /// NumPy's name of a type without byte order: `f4`.
-fn numpy_name(ty: SampleType) -> String {
+pub(crate) fn numpy_name(ty: impl Into<StoredType>) -> String {
+    let ty = ty.into();
     format!("{}{}", &ty.name()[..1], ty.size())
 }
 

@@ -1,67 +1,91 @@
 //! The types of numbers as files store them: those of samples, and integers of 64 bits, which are samples of 32.
 
-use crate::base::sample::{self, SampleType};
+use crate::base::sample::SampleType;
 use std::fmt;
+use wavesplat_format::NumberType;
 
 /// The type of a stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names say it")]
 pub(crate) enum StoredType {
-    /// A type that samples have too.
-    Sample(SampleType),
-    /// Signed, of 64 bits.
-    I64,
-    /// Unsigned, of 64 bits.
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
     U64,
+    I64,
+    F16,
+    F32,
+    F64,
 }
+
+/// Each type, that of its samples, and that of such numbers in a description, which has no halves.
+const TYPES: [(StoredType, SampleType, Option<NumberType>); 11] = [
+    (StoredType::U8, SampleType::U8, Some(NumberType::U8)),
+    (StoredType::I8, SampleType::I8, Some(NumberType::I8)),
+    (StoredType::U16, SampleType::U16, Some(NumberType::U16)),
+    (StoredType::I16, SampleType::I16, Some(NumberType::I16)),
+    (StoredType::U32, SampleType::U32, Some(NumberType::U32)),
+    (StoredType::I32, SampleType::I32, Some(NumberType::I32)),
+    (StoredType::U64, SampleType::U32, Some(NumberType::U64)),
+    (StoredType::I64, SampleType::I32, Some(NumberType::I64)),
+    (StoredType::F16, SampleType::F16, None),
+    (StoredType::F32, SampleType::F32, Some(NumberType::F32)),
+    (StoredType::F64, SampleType::F64, Some(NumberType::F64)),
+];
 
 impl From<SampleType> for StoredType {
     fn from(ty: SampleType) -> Self {
-        Self::Sample(ty)
+        let own = TYPES.iter().find(|(stored, sample, _)| *sample == ty && !stored.is_64_bit());
+        own.map_or(Self::F64, |(stored, ..)| *stored)
     }
 }
 
 impl StoredType {
     /// Every type.
-    #[cfg(test)]
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        SampleType::ALL.into_iter().map(Self::Sample).chain([Self::I64, Self::U64])
+        TYPES.into_iter().map(|(stored, ..)| stored)
+    }
+
+    /// The type of numbers in a description; none for characters.
+    pub(crate) fn from_number(ty: NumberType) -> Option<Self> {
+        TYPES.into_iter().find(|(.., number)| *number == Some(ty)).map(|(stored, ..)| stored)
+    }
+
+    /// The type of such numbers in a description; none for halves.
+    pub(crate) const fn number(self) -> Option<NumberType> {
+        TYPES[self as usize].2
+    }
+
+    /// The type of the samples that such numbers are.
+    pub(crate) const fn sample(self) -> SampleType {
+        TYPES[self as usize].1
+    }
+
+    /// Whether it has more bits than its samples.
+    pub(crate) const fn is_64_bit(self) -> bool {
+        matches!(self, Self::I64 | Self::U64)
     }
 
     /// Bytes of one number.
     pub(crate) const fn size(self) -> usize {
-        match self {
-            Self::Sample(ty) => ty.size(),
-            Self::I64 | Self::U64 => 8,
-        }
+        if self.is_64_bit() { 8 } else { self.sample().size() }
     }
 
     /// What it is called in messages.
     pub(crate) const fn name(self) -> &'static str {
         match self {
-            Self::Sample(ty) => ty.name(),
             Self::I64 => "i64",
             Self::U64 => "u64",
+            _ => self.sample().name(),
         }
-    }
-
-    /// The type of the samples that such numbers are.
-    pub(crate) const fn sample(self) -> SampleType {
-        match self {
-            Self::Sample(ty) => ty,
-            Self::I64 => SampleType::I32,
-            Self::U64 => SampleType::U32,
-        }
-    }
-
-    /// Whether it has more bits than its samples.
-    pub(crate) const fn is_wide(self) -> bool {
-        matches!(self, Self::I64 | Self::U64)
     }
 
     /// Turns the byte order of every number.
     pub(crate) fn swap_endian(self, bytes: &mut [u8]) {
-        let ty = if let Self::Sample(ty) = self { ty } else { SampleType::F64 }; // as many bytes
-        sample::swap_endian(ty, bytes);
+        bytes.chunks_exact_mut(self.size()).for_each(<[u8]>::reverse);
     }
 }
 
@@ -77,14 +101,18 @@ mod tests {
 
     #[test]
     fn only_integers_of_64_bits_differ_from_their_samples() {
-        for ty in StoredType::all() {
-            assert_eq!(ty.is_wide(), ty.size() != ty.sample().size());
-            assert_eq!(ty.is_wide(), ty.name() != ty.sample().name());
+        for (number, ty) in StoredType::all().enumerate() {
+            assert_eq!(TYPES[number].0 as usize, number, "rows are in the order of the types");
+            assert_eq!(ty.is_64_bit(), ty.size() != ty.sample().size());
+            assert_eq!(ty.is_64_bit(), ty.name() != ty.sample().name());
+            assert_eq!(ty.is_64_bit(), StoredType::from(ty.sample()) != ty);
+            assert!(ty.number().is_none_or(|number| StoredType::from_number(number) == Some(ty)));
+            assert!(ty.number().is_none_or(|number| number.size() == ty.size()));
         }
         let mut bytes = [1, 2, 3, 4, 5, 6, 7, 8];
         StoredType::I64.swap_endian(&mut bytes);
         assert_eq!(bytes, [8, 7, 6, 5, 4, 3, 2, 1]);
-        StoredType::Sample(SampleType::U16).swap_endian(&mut bytes);
+        StoredType::U16.swap_endian(&mut bytes);
         assert_eq!(bytes, [7, 8, 5, 6, 3, 4, 1, 2]);
     }
 }

@@ -1,7 +1,7 @@
 //! Tips for arguments that are not understood.
 
 use super::config::{Config, chosen_command};
-use crate::source;
+use crate::formats;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::ffi::OsString;
@@ -59,7 +59,7 @@ const HEADERLESS: [&str; 3] = ["raw", "bin", "img"];
 fn is_frames(word: &str) -> bool {
     let word = word.to_lowercase();
     let ends = |ending| word.strip_suffix(ending).is_some_and(|name: &str| name.ends_with('.'));
-    source::extensions().chain(HEADERLESS).any(ends)
+    formats::extensions().chain(HEADERLESS).any(ends)
 }
 
 /// Names the command that has an option which this command lacks.

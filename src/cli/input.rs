@@ -8,6 +8,7 @@ use crate::base::mapped::Access;
 use crate::base::sample::SampleType;
 use crate::file::CoefficientFile;
 use crate::file::setting;
+use crate::formats;
 #[cfg(feature = "cli")]
 use crate::picture::is_coefficient_name;
 use crate::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
@@ -108,12 +109,12 @@ impl InputArgs {
 
     /// Opens an archive and prints no notes. Decoded or piped frames may take `memory` bytes.
     pub fn open_quietly(&self, inputs: &[PathBuf], memory: usize) -> Result<Box<dyn FrameSource>> {
-        source::open(inputs, &self.open_options(memory)?)
+        formats::open(inputs, &self.open_options(memory)?)
     }
 
     /// The variables among which `--variable` must choose; none if the archive can be opened without it.
     pub fn undecided(&self, inputs: &[PathBuf], memory: usize) -> Result<Vec<VariableInfo>> {
-        source::undecided(inputs, &self.options(memory))
+        formats::undecided(inputs, &self.options(memory))
     }
 
     /// All options but times, which may be in a file.
@@ -222,7 +223,7 @@ impl InputArgs {
             times: self.given_times()?,
             ..self.completed(of)?.options(common.stream_memory())
         };
-        let source = source::open(inputs, &options)?;
+        let source = formats::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(n));
         narrow(source, frames, remembered(of, "region")?)
     }

@@ -1,7 +1,7 @@
 //! Words errors and notes of the library as options of the programs.
 
 use crate::base::error::{Error, Note, Remedy};
-use crate::source::extensions;
+use crate::formats::extensions;
 use clap::Command;
 use std::borrow::Cow;
 

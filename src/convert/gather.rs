@@ -281,7 +281,7 @@ impl<'a> WindowReader<'a> {
 
     /// Notes a value that may mean "missing"; an error if it would leave nothing of the others.
     fn look_for_fill(&mut self, window: &dyn FrameWindow, scan: &Scan) -> Result<()> {
-        let extreme = scan.ends.extreme().filter(|_| self.plan.colour_transform.is_none());
+        let extreme = scan.extremes.extreme().filter(|_| self.plan.colour_transform.is_none());
         let Some(extreme) = extreme else { return Ok(()) };
         let ConvertConfig { bound, tolerance, range, refuse_fill, .. } = *self.config;
         let of_range = matches!(bound, Bound::Pointwise | Bound::Rms) && range.is_none() && refuse_fill;

@@ -5,7 +5,7 @@ use super::{ConvertConfig, ConvertReport};
 use crate::base::error::{Note, Remedy};
 use crate::base::sample::SampleType;
 use crate::codec::bound::Bound;
-use crate::source::ends::{Extreme, is_customary, written};
+use crate::source::extremes::{Extreme, is_customary, written};
 use wavesplat_format::Basis;
 
 /// What the reader saw in the samples.

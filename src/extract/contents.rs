@@ -1,177 +1,40 @@
-//! The description of extracted samples, for the headers of all formats.
+//! What is extracted, for the headers of files.
 
 use super::ExtractConfig;
-use super::order::{OutputAxis, SampleOrder};
-use crate::base::description::{Description, Orientation, coordinates, is_regular, narrowed};
+use crate::base::description::narrowed;
 use crate::base::error::Result;
-use crate::base::grid::Grid;
-use crate::base::sample::{SampleType, missing_value, round_to};
+use crate::base::sample::{missing_value, round_to};
 use crate::file::{CoefficientFile, setting};
+use crate::formats::{Contents, plain};
 use crate::source::CHANNELS;
 
-/// The largest deviation of regular times from equal steps, in steps.
-const REGULAR: f64 = 1e-6;
-
-/// Voxels in the world, in the order in which they are written.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Lattice {
-    /// Voxels along each axis, the fastest first.
-    pub(super) dims: [usize; 3],
-    /// World position of the first voxel.
-    pub(super) first: [f64; 3],
-    /// World direction of each axis, the fastest first; of any length.
-    directions: [[f64; 3]; 3],
-    /// A step along each axis is its direction times this.
-    spacing: [f64; 3],
-    /// The directions in which the world's axes ascend; empty if unknown.
-    pub(super) space: String,
-}
-
-impl Lattice {
-    /// The length of a step along each axis.
-    pub(super) fn spacing(&self) -> [f64; 3] {
-        std::array::from_fn(|axis| if self.is_unit(axis) { self.spacing[axis] } else { length(self.steps()[axis]) })
-    }
-
-    /// The directions of the axes, of length 1.
-    pub(super) fn directions(&self) -> [[f64; 3]; 3] {
-        let of_length = |axis: usize| self.directions[axis].map(|along| along / length(self.directions[axis]));
-        std::array::from_fn(|axis| if self.is_unit(axis) { self.directions[axis] } else { of_length(axis) })
-    }
-
-    /// From a voxel to the next along each axis, the fastest first.
-    pub(super) fn steps(&self) -> [[f64; 3]; 3] {
-        std::array::from_fn(|axis| self.directions[axis].map(|along| along * self.spacing[axis]))
-    }
-
-    /// The same lattice, seen from the other side along x and y: from ITK's world in that of NIfTI, or back.
-    pub(super) fn turned(mut self) -> Self {
-        for place in self.directions.iter_mut().chain([&mut self.first]) {
-            (place[0], place[1]) = (-place[0], -place[1]);
-        }
-        self
-    }
-
-    /// Whether the direction of an axis has the length 1, but for rounding: then it is kept to the bit.
-    fn is_unit(&self, axis: usize) -> bool {
-        (length(self.directions[axis]) - 1.0).abs() < 1e-6
-    }
-}
-
-fn length(vector: [f64; 3]) -> f64 {
-    vector.iter().map(|along| along * along).sum::<f64>().sqrt()
-}
-
-/// A description of the extracted samples for a file's header.
-#[derive(Debug, Clone)]
-pub struct Contents {
-    /// The lattice of the extracted region.
-    pub grid: Grid,
-    /// The type of the samples.
-    pub sample: SampleType,
-    /// The number of each frame in the coefficient file.
-    pub frames: Vec<usize>,
-    /// The time of each frame, or its number if the file has no times.
-    pub times: Vec<f64>,
-    /// Whether `times` are frame numbers.
-    pub numbered: bool,
-    /// The name of the variable. All texts here have no control characters.
-    pub name: String,
-    /// The unit of the samples.
-    pub units: Option<String>,
-    /// The unit of times.
-    pub time_units: Option<String>,
-    /// The calendar of times, if known.
-    pub calendar: Option<String>,
-    /// The unit of positions.
-    pub space_units: Option<String>,
-    /// The value of missing samples, if some may be missing: a number of the sample type, or NaN.
-    pub missing: Option<f64>,
-    /// What the source says beside the samples, of these frames and voxels; none of a channel of colours.
-    pub description: Option<Description>,
-}
-
-impl Contents {
-    /// Describes what `config` extracts from a file.
-    ///
-    /// # Errors
-    /// The description of the file is damaged, or cannot be read.
-    pub fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
-        let m = file.metadata();
-        let text = |name| setting(m, name).map(plain).filter(|text| !text.is_empty());
-        let channel = file.colour_transform().map(|_| CHANNELS[config.channel]);
-        let name = channel.or(m.variable.as_deref()).map(plain).filter(|name| !name.is_empty());
-        let numbered = m.times.is_empty();
-        let time = |frame: &usize| if numbered { *frame as f64 } else { m.times[*frame] };
-        let description = if channel.is_none() { file.description()? } else { None };
-        let description = description.map(|all| narrowed(&all, &config.frames, &config.region, 1 << file.lod()));
-        Ok(Self {
-            grid: file.grid.crop(&config.region),
-            sample: file.sample(),
-            frames: config.frames.clone(),
-            times: config.frames.iter().map(time).collect(),
-            numbered,
-            name: name.unwrap_or_else(|| "values".into()),
-            units: text("units").filter(|_| channel.is_none()),
-            time_units: text("time-units").filter(|_| !numbered),
-            calendar: text("calendar").filter(|_| !numbered),
-            space_units: text("space-units"),
-            missing: missing(file, config),
-            description,
-        })
-    }
-
-    /// Where the voxels of each frame are: in the order of the source's array if it says how its axes go in the world.
-    pub(super) fn lattice(&self) -> Lattice {
-        let described = self.description.as_ref().and_then(|all| Some((all, all.orientation.as_ref()?)));
-        let Some((description, orientation)) = described else { return self.straight_lattice() };
-        let Orientation { space, first, directions, spacing } = orientation.clone();
-        let voxels = SampleOrder::of_lattice(description).axes().into_iter().rev().filter_map(OutputAxis::voxels);
-        let mut lengths = voxels.map(|axis| self.grid.dims[axis]);
-        Lattice { dims: std::array::from_fn(|_| lengths.next().unwrap_or(1)), first, directions, spacing, space }
-    }
-
-    /// The ascending coordinates of an axis of voxels, from the source or else from the lattice. Descending
-    /// coordinates, such as depths, are negated.
-    pub(super) fn coordinates(&self, axis: usize) -> Vec<f64> {
-        let mut own = self.description.as_ref().and_then(|description| coordinates(description, axis));
-        if let Some(at) = own.as_mut().filter(|at| at.last() < at.first()) {
-            at.iter_mut().for_each(|at| *at = -*at);
-        }
-        own.unwrap_or_else(|| (0..self.grid.dims[axis]).map(|i| self.grid.position([i; 3])[axis]).collect())
-    }
-
-    /// The axes whose coordinates are not at regular steps.
-    pub(super) fn irregular_axes(&self) -> Vec<&'static str> {
-        let is_irregular = |axis: &usize| !is_regular(&self.coordinates(*axis));
-        (0..3).filter(is_irregular).map(|axis| ["x", "y", "z"][axis]).collect()
-    }
-
-    /// Whether the source's axes go along those of the world, in any order and direction.
-    pub(super) fn is_straight(&self) -> bool {
-        let along = |step: &[f64; 3]| step.iter().filter(|along| **along != 0.0).count();
-        self.lattice().directions.iter().all(|step| along(step) == 1)
-    }
-
-    /// The lattice with its axes along those of the world.
-    pub(super) fn straight_lattice(&self) -> Lattice {
-        let Grid { dims, spacing, origin } = self.grid;
-        let along = |axis: usize| std::array::from_fn(|a| if a == axis { 1.0 } else { 0.0 });
-        Lattice { dims, first: origin, directions: [0, 1, 2].map(along), spacing, space: String::new() }
-    }
-
-    /// The first time and the step between times, if all steps are equal.
-    pub(super) fn regular_times(&self) -> Option<(f64, f64)> {
-        let [first, .., last] = self.times[..] else { return None };
-        let step = (last - first) / (self.times.len() - 1) as f64;
-        let is_near = |(i, time): (usize, &f64)| (first + step * i as f64 - time).abs() <= REGULAR * step;
-        (step > 0.0 && self.times.iter().enumerate().all(is_near)).then_some((first, step))
-    }
-
-    /// The number of samples in one frame.
-    pub(super) fn voxels(&self) -> u64 {
-        self.grid.dims.iter().fold(1, |n: u64, dim| n.saturating_mul(*dim as u64))
-    }
+/// Describes what `config` extracts from a file.
+///
+/// # Errors
+/// The description of the file is damaged, or cannot be read.
+pub fn contents(file: &CoefficientFile, config: &ExtractConfig) -> Result<Contents> {
+    let m = file.metadata();
+    let text = |name| setting(m, name).map(plain).filter(|text| !text.is_empty());
+    let channel = file.colour_transform().map(|_| CHANNELS[config.channel]);
+    let name = channel.or(m.variable.as_deref()).map(plain).filter(|name| !name.is_empty());
+    let numbered = m.times.is_empty();
+    let time = |frame: &usize| if numbered { *frame as f64 } else { m.times[*frame] };
+    let description = if channel.is_none() { file.description()? } else { None };
+    let description = description.map(|all| narrowed(&all, &config.frames, &config.region, 1 << file.lod()));
+    Ok(Contents {
+        grid: file.grid.crop(&config.region),
+        sample: file.sample(),
+        frames: config.frames.clone(),
+        times: config.frames.iter().map(time).collect(),
+        numbered,
+        name: name.unwrap_or_else(|| "values".into()),
+        units: text("units").filter(|_| channel.is_none()),
+        time_units: text("time-units").filter(|_| !numbered),
+        calendar: text("calendar").filter(|_| !numbered),
+        space_units: text("space-units"),
+        missing: missing(file, config),
+        description,
+    })
 }
 
 /// The value of missing samples: the declared one, or NaN if some are missing.
@@ -182,42 +45,4 @@ fn missing(file: &CoefficientFile, config: &ExtractConfig) -> Option<f64> {
     }
     let any = config.frames.iter().any(|frame| file.has_missing(file.window_of(*frame)));
     (any && ty.is_float()).then_some(f64::NAN)
-}
-
-/// Text fit for one line of a header.
-pub(super) fn plain(text: &str) -> String {
-    text.trim().chars().filter(|c| !c.is_control()).collect()
-}
-
-#[cfg(test)]
-pub(super) mod testing {
-    use super::*;
-
-    /// Three frames of 5 x 4 x 3 voxels, with all units.
-    pub(in crate::extract) fn contents() -> Contents {
-        Contents {
-            grid: Grid { dims: [5, 4, 3], spacing: [0.5, 2.0, 1.0], origin: [-1.0, 0.0, 7.5] },
-            sample: SampleType::I16,
-            frames: vec![2, 4, 6],
-            times: vec![0.25, 0.5, 0.75],
-            numbered: false,
-            name: "a & \"b\"".into(),
-            units: Some("<K>".into()),
-            time_units: Some("s".into()),
-            calendar: None,
-            space_units: Some("mm".into()),
-            missing: None,
-            description: None,
-        }
-    }
-
-    #[test]
-    fn steps_of_times_are_all_the_same_or_none() {
-        let regular = |times: &[f64]| Contents { times: times.to_vec(), ..contents() }.regular_times();
-        assert_eq!(regular(&[0.25, 0.5, 0.75]), Some((0.25, 0.25)));
-        assert_eq!(regular(&[0.0, 0.1, 0.2, 0.30000000000000004]).map(|(_, step)| (step * 1e9).round()), Some(1e8));
-        for irregular in [&[0.0, 0.1, 0.3][..], &[3.0, 2.0, 1.0], &[1.0, 1.0], &[7.0], &[]] {
-            assert_eq!(regular(irregular), None, "{irregular:?}");
-        }
-    }
 }

@@ -3,25 +3,12 @@
 
 mod ahead;
 mod contents;
-mod dataset;
-mod encoding;
-mod field_data;
-mod format;
-mod metaimage;
-mod netcdf;
-mod nifti;
-mod nrrd;
-mod order;
 mod read;
 mod sink;
-mod store;
-mod vti;
-mod vtr;
-mod zarr;
+mod strides;
 
-pub use contents::Contents;
-pub use format::SampleFormat;
-pub use order::{Direction, OutputAxis, SampleOrder};
+pub use crate::formats::{Contents, Direction, OutputAxis, SampleFormat, SampleOrder};
+pub use contents::contents;
 pub use read::read_region;
 pub use sink::{Files, Sink};
 
@@ -32,11 +19,10 @@ use crate::base::progress::Progress;
 use crate::codec::WindowCodec;
 use crate::file::CoefficientFile;
 use ahead::fetch_ahead;
-
-use order::Strides;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
+use strides::{Strides, length};
 use wavesplat_format::BlockEntry;
 
 /// What to extract. [`ExtractConfig::new`] asks for everything; narrow it by struct update.
@@ -168,7 +154,8 @@ struct Piece {
 impl Pieces {
     fn new(file: &CoefficientFile, config: &ExtractConfig) -> Result<Self> {
         config.check(file)?;
-        let [_, second, third, fastest] = config.order.axes().map(|axis| axis.len(config.frames.len(), &config.region));
+        let length = |axis| length(axis, config.frames.len(), &config.region);
+        let [_, second, third, fastest] = config.order.axes().map(length);
         let plane = third.saturating_mul(fastest).saturating_mul(file.sample().size());
         let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
         if available < plane {
@@ -190,7 +177,7 @@ impl Pieces {
         let whole = Piece { frames: config.frames.clone(), region: config.region };
         let [slowest, second, ..] = config.order.axes();
         let slabs = whole.divided(slowest, self.items[0], file);
-        if self.items[1] >= second.len(config.frames.len(), &config.region) {
+        if self.items[1] >= length(second, config.frames.len(), &config.region) {
             return slabs;
         }
         slabs.into_iter().flat_map(|slab| slab.divided(second, self.items[1], file)).collect()
@@ -238,7 +225,7 @@ fn read_piece(
     out: &mut Vec<u8>,
 ) -> Result<ExtractReport> {
     let mut report = ExtractReport::default();
-    let strides = config.order.strides(piece.frames.len(), &piece.region);
+    let strides = Strides::new(&config.order, piece.frames.len(), &piece.region);
     out.resize(piece.frames.len() * piece.region.voxels() * file.sample().size(), 0); // blocks overwrite all of it
     let mut first = 0;
     for frames in file.by_window(&piece.frames) {
@@ -314,14 +301,14 @@ impl Target {
                 let voxel = [shared.start[0], y, z];
                 let from = (from_frame * block.voxels() + block.index(voxel)) * size;
                 let to = self.strides.place(self.first + to_frame, voxel);
-                copy_row(&samples[from..from + row], size, (to, self.strides.along_x()), out);
+                copy_row(&samples[from..from + row], size, to, self.strides.along_x(), out);
             }
         }
     }
 }
 
 /// Copies samples of `size` bytes to places that begin at `to` and lie `step` apart.
-fn copy_row(row: &[u8], size: usize, (to, step): (usize, isize), out: &mut [u8]) {
+fn copy_row(row: &[u8], size: usize, to: usize, step: isize, out: &mut [u8]) {
     if step == 1 {
         return out[to * size..][..row.len()].copy_from_slice(row);
     }

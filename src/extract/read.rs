@@ -20,11 +20,11 @@ pub fn read_region(file: &CoefficientFile, frames: Range<usize>, region: &Region
     let config = ExtractConfig { frames: frames.collect(), region: *region, ..ExtractConfig::new(file) };
     config.check(file)?;
     let mut samples = Vec::with_capacity(config.frames.len() * region.voxels());
-    let of = |value: f64| if is_missing(value, declared) { f32::NAN } else { value as f32 };
+    let present_or_nan = |value: f64| if is_missing(value, declared) { f32::NAN } else { value as f32 };
     let mut append = |bytes: &[u8]| {
         let first = samples.len();
         samples.resize(first + bytes.len() / sample.size(), 0.0);
-        load_as(sample, bytes, &mut samples[first..], of);
+        load_as(sample, bytes, &mut samples[first..], present_or_nan);
         Ok(())
     };
     extract_to(file, &config, &mut append, &Silent)?;

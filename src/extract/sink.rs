@@ -1,13 +1,10 @@
 //! Writes extracted samples to files.
 
-use super::contents::{Contents, Lattice};
-use super::encoding::Encoding;
-use super::format::SampleFormat;
-use super::store::StoreSink;
-use super::{metaimage, netcdf, nifti, nrrd, vti, vtr};
+use super::{Contents, SampleFormat};
 use crate::base::error::{Error, Result};
-use crate::base::npy;
 use crate::base::output::{Numbered, Output, STANDARD};
+use crate::formats::encoding::Encoding;
+use crate::formats::writer::{OutputFiles, SampleSink, Samples, Writer};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::fs;
@@ -28,20 +25,25 @@ impl Files {
     /// The files for `path`: itself, or `-` for standard output. If each frame has its own file, `path` is a pattern
     /// like `out_%04d.vti`. Headers and lists also have files beside them.
     pub fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
-        let (samples, last) = match format {
-            SampleFormat::Vti | SampleFormat::Vtr => (numbered(path, format, frames)?, None),
-            SampleFormat::Zarr if path == Path::new(STANDARD) => {
-                return Err(Error::path(path, "a Zarr store is a folder, which standard output cannot take"));
+        let writer = format.writer();
+        let (samples, last) = match writer.files {
+            OutputFiles::EachFrame => (numbered(path, format, frames)?, None),
+            OutputFiles::Folder(_) if path == Path::new(STANDARD) => {
+                let label = writer.label.unwrap_or_default();
+                return Err(Error::path(
+                    path,
+                    format!("a {label} store is a folder, which standard output cannot take"),
+                ));
             }
-            SampleFormat::Pvd => {
-                let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, "vti"));
+            OutputFiles::List { extension, .. } => {
+                let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, extension));
                 (frames.iter().map(|frame| folder.join(names.of(*frame))).collect(), Some(path.into()))
             }
-            SampleFormat::Nhdr => {
+            OutputFiles::WithHeader { extension, .. } => {
                 stem(path)?;
-                (vec![path.with_extension("raw")], Some(path.into()))
+                (vec![path.with_extension(extension)], Some(path.into()))
             }
-            _ => (vec![path.into()], None),
+            OutputFiles::One | OutputFiles::Folder(_) => (vec![path.into()], None),
         };
         Ok(Self { format, samples, last })
     }
@@ -53,7 +55,7 @@ impl Files {
 
     /// The folder of the files of a list.
     fn folder(&self) -> Option<&Path> {
-        self.samples[0].parent().filter(|_| self.format == SampleFormat::Pvd)
+        self.samples[0].parent().filter(|_| matches!(self.format.writer().files, OutputFiles::List { .. }))
     }
 
     /// Checks in advance that the files can be created, as far as that is possible.
@@ -121,11 +123,8 @@ enum Stream {
 }
 
 impl Stream {
-    fn new(out: Output, format: SampleFormat) -> Self {
-        match format {
-            SampleFormat::NiftiGz => Self::Gzip(GzEncoder::new(out, GZIP_LEVEL)),
-            _ => Self::Plain(out),
-        }
+    fn new(out: Output, gzip: bool) -> Self {
+        if gzip { Self::Gzip(GzEncoder::new(out, GZIP_LEVEL)) } else { Self::Plain(out) }
     }
 
     /// Completes the gzip.
@@ -158,38 +157,26 @@ const GZIP_LEVEL: Compression = Compression::new(3);
 
 /// Writes samples to the files of an extraction.
 #[derive(Debug)]
-pub struct Sink<'a>(Kind<'a>);
-
-#[derive(Debug)]
-enum Kind<'a> {
-    Files(FileSink<'a>),
-    Store(StoreSink),
-}
+pub struct Sink<'a>(Box<dyn SampleSink + 'a>);
 
 impl<'a> Sink<'a> {
     /// Opens the first file; existing files are an error unless `force` replaces them.
     pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
         let encoding = files.format.encoding(contents);
-        Ok(Self(match files.format {
-            SampleFormat::Zarr => Kind::Store(StoreSink::create(&files.samples[0], contents, encoding, force)?),
-            _ => Kind::Files(FileSink::create(files, contents, encoding, force)?),
+        Ok(Self(match files.format.writer().files {
+            OutputFiles::Folder(create) => create(&files.samples[0], contents, encoding, force)?,
+            _ => Box::new(FileSink::create(files, contents, encoding, force)?),
         }))
     }
 
     /// Writes the next samples, given little-endian.
     pub fn write(&mut self, samples: &[u8]) -> Result<()> {
-        match &mut self.0 {
-            Kind::Files(files) => files.write(samples),
-            Kind::Store(store) => store.write(samples),
-        }
+        self.0.write(samples)
     }
 
     /// Commits the last file of samples, and writes the list or header if there is one.
     pub fn finish(self) -> Result<()> {
-        match self.0 {
-            Kind::Files(files) => files.finish(),
-            Kind::Store(store) => store.finish(),
-        }
+        self.0.finish()
     }
 }
 
@@ -217,7 +204,9 @@ impl<'a> FileSink<'a> {
         sink.begin()?;
         Ok(sink)
     }
+}
 
+impl SampleSink for FileSink<'_> {
     fn write(&mut self, mut samples: &[u8]) -> Result<()> {
         while !samples.is_empty() {
             if self.left == 0 {
@@ -236,20 +225,23 @@ impl<'a> FileSink<'a> {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<()> {
+    fn finish(mut self: Box<Self>) -> Result<()> {
         self.end()?;
         let Some(path) = &self.files.last else { return Ok(()) };
         let mut out = Output::create(path, self.force)?;
         self.write_last(&mut out).map_err(|e| Error::io(path, "writing", e))?;
         out.commit()
     }
+}
 
+impl FileSink<'_> {
     /// Opens the next file and writes its header.
     fn begin(&mut self) -> Result<()> {
         let path = &self.files.samples[self.begun];
         let frames = self.contents.frames.len() / self.files.samples.len();
-        let mut out = Stream::new(Output::create(path, self.force)?, self.files.format);
-        self.write_header(&mut out).map_err(|e| Error::io(path, "writing", e))?;
+        let mut out = Stream::new(Output::create(path, self.force)?, self.writer().gzip);
+        (self.writer().before)(self.contents, self.samples(self.begun), &mut out)
+            .map_err(|e| Error::io(path, "writing", e))?;
         self.left = self.contents.voxels().saturating_mul((frames * self.encoding.from.size()) as u64);
         (self.open, self.begun) = (Some(out), self.begun + 1);
         Ok(())
@@ -258,52 +250,31 @@ impl<'a> FileSink<'a> {
     /// Writes the text after the samples and commits the file.
     fn end(&mut self) -> Result<()> {
         let Some(mut out) = self.open.take() else { return Ok(()) };
-        let end = match self.files.format {
-            SampleFormat::Vti | SampleFormat::Pvd | SampleFormat::Vtr => vti::END.to_vec(),
-            SampleFormat::Netcdf => netcdf::padding(self.contents, self.encoding.to),
-            _ => Vec::new(),
-        };
+        let end = (self.writer().after)(self.contents, self.samples(self.begun - 1));
         let failed = |e| Error::io(&self.files.samples[self.begun - 1], "writing", e);
         out.write_all(&end).map_err(failed)?;
         out.finish().map_err(failed)?.commit()
     }
 
-    fn write_header(&self, out: &mut Stream) -> io::Result<()> {
-        let (contents, ty) = (self.contents, self.encoding.to);
-        match self.files.format {
-            SampleFormat::Npy => {
-                let [x, y, z] = contents.grid.dims;
-                npy::write_header(ty, &[contents.frames.len(), z, y, x], out)
-            }
-            SampleFormat::Nrrd => nrrd::write_header(contents, ty, None, out),
-            SampleFormat::Vti | SampleFormat::Pvd => {
-                let lattice = self.lattice();
-                vti::write_header(contents, &lattice, (ty, contents.times[self.begun]), out)
-            }
-            SampleFormat::Nifti | SampleFormat::NiftiGz => nifti::write_header(contents, ty, out),
-            SampleFormat::MetaImage => metaimage::write_header(contents, ty, out),
-            SampleFormat::Netcdf => netcdf::write_header(contents, ty, out),
-            SampleFormat::Vtr => vtr::write_header(contents, (ty, contents.times[self.begun]), out),
-            SampleFormat::Raw | SampleFormat::Nhdr | SampleFormat::Zarr => Ok(()),
-        }
+    fn writer(&self) -> &'static Writer {
+        self.files.format.writer()
     }
 
-    /// Where the voxels are, in the order in which they are written.
-    fn lattice(&self) -> Lattice {
-        match self.files.format.has_lattice(self.contents) {
-            true => self.contents.lattice(),
-            false => self.contents.straight_lattice(),
-        }
+    /// The samples of a file, by its number.
+    fn samples(&self, file: usize) -> Samples {
+        Samples { ty: self.encoding.to, frame: file }
     }
 
     fn write_last(&self, out: &mut Output) -> io::Result<()> {
         let samples = &self.files.samples;
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if self.files.format == SampleFormat::Nhdr {
-            return nrrd::write_header(self.contents, self.encoding.to, Some(&name(&samples[0])), out);
+        match self.writer().files {
+            OutputFiles::WithHeader { write, .. } => write(self.contents, self.encoding.to, &name(&samples[0]), out),
+            OutputFiles::List { write, .. } => {
+                let folder = self.files.folder().map(name).unwrap_or_default();
+                write(self.contents, &mut samples.iter().map(|path| format!("{folder}/{}", name(path))), out)
+            }
+            OutputFiles::One | OutputFiles::EachFrame | OutputFiles::Folder(_) => Ok(()),
         }
-        let folder = self.files.folder().map(name).unwrap_or_default();
-        let within = samples.iter().map(|path| format!("{folder}/{}", name(path)));
-        vti::write_list(self.contents, within, out)
     }
 }

@@ -6,10 +6,11 @@ use crate::base::address::{is_address, public_name};
 use crate::base::error::{Error, Result};
 use crate::base::output::STANDARD;
 use crate::file::CoefficientFile;
+use crate::formats;
 use crate::remote::RemoteOptions;
 use crate::render::SplatSource;
 use crate::render::parts::is_part;
-use crate::source::{self, FrameSource, OpenOptions};
+use crate::source::{FrameSource, OpenOptions};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -107,7 +108,7 @@ impl Session {
 
     /// Opens the frames, and reports how they are read.
     pub(super) fn open_frames(&self, reporter: &dyn Reporter) -> Result<Box<dyn FrameSource>> {
-        let source = source::open(&self.shared.inputs.paths, &self.shared.inputs.frames)?;
+        let source = formats::open(&self.shared.inputs.paths, &self.shared.inputs.frames)?;
         source.archive().notes.iter().for_each(|note| reporter.note_source(note));
         Ok(source)
     }
@@ -143,5 +144,5 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
 pub(crate) fn is_coefficient_name(path: &Path) -> bool {
     let name = public_name(path);
     let ending = name.extension().and_then(OsStr::to_str).unwrap_or_default();
-    ending == "wspl" || is_address(path) && !source::extensions().any(|of_frames| of_frames == ending)
+    ending == "wspl" || is_address(path) && !formats::extensions().any(|of_frames| of_frames == ending)
 }

@@ -41,34 +41,34 @@ impl Units {
 
 /// The content of the header of one input file.
 #[derive(Debug)]
-pub(super) struct FileHeader {
+pub(crate) struct FileHeader {
     /// What the file is, by name.
-    pub(super) format: &'static str,
+    pub(crate) format: &'static str,
     /// Voxels and sample type of every frame.
-    pub(super) shape: Shape,
+    pub(crate) shape: Shape,
     /// World units between voxels along x, y, z.
-    pub(super) spacing: [f64; 3],
+    pub(crate) spacing: [f64; 3],
     /// World position of the first voxel.
-    pub(super) origin: [f64; 3],
+    pub(crate) origin: [f64; 3],
     /// Time of each frame, or empty.
-    pub(super) times: Vec<f64>,
+    pub(crate) times: Vec<f64>,
     /// Name of the variable, if the file says so.
-    pub(super) variable: Option<String>,
+    pub(crate) variable: Option<String>,
     /// What its numbers are measured in.
-    pub(super) units: Units,
+    pub(crate) units: Units,
     /// What stands for missing samples, if the file says that some may be: NaN, or another value.
-    pub(super) missing: Option<f64>,
+    pub(crate) missing: Option<f64>,
     /// What the file says beside the samples.
-    pub(super) description: Option<Description>,
+    pub(crate) description: Option<Description>,
     /// What a user should know about how the file is read.
-    pub(super) notes: Vec<Note>,
+    pub(crate) notes: Vec<Note>,
     /// Where the frames are.
-    pub(super) parts: Vec<Part>,
+    pub(crate) parts: Vec<Part>,
 }
 
 impl FileHeader {
     /// A header with nothing but frames.
-    pub(super) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
+    pub(crate) fn plain(shape: Shape, parts: Vec<Part>) -> Self {
         let Grid { spacing, origin, .. } = Grid::unit(shape.dims());
         let (times, units, notes) = (Vec::new(), Units::default(), Vec::new());
         let (format, variable, missing, description) = ("headerless", None, None, None);
@@ -76,12 +76,12 @@ impl FileHeader {
     }
 
     /// Number of frames.
-    pub(super) fn frames(&self) -> usize {
+    pub(crate) fn frames(&self) -> usize {
         self.parts.iter().map(|part| part.frames).sum()
     }
 
     /// Leaves out the bounds of times, which are on the file's own clock.
-    pub(super) fn drop_bounds_of_times(&mut self) {
+    pub(crate) fn drop_bounds_of_times(&mut self) {
         let Some(description) = &mut self.description else { return };
         let of_times = description.variables.iter().filter(|variable| matches!(variable.values, Values::Times(_)));
         let bounds = of_times.flat_map(|times| &times.attributes).filter(|attribute| attribute.name == "bounds");
@@ -90,13 +90,13 @@ impl FileHeader {
     }
 
     /// Describes the frames as those of an archive, in which others may follow.
-    pub(super) fn stack_frames(&mut self) {
+    pub(crate) fn stack_frames(&mut self) {
         let frames = self.frames();
         self.description = self.description.take().map(|description| with_frames(description, frames));
     }
 
     /// The grid of every frame.
-    pub(super) fn grid(&self) -> Grid {
+    pub(crate) fn grid(&self) -> Grid {
         Grid { dims: self.shape.dims(), spacing: self.spacing, origin: self.origin }
     }
 
@@ -105,7 +105,7 @@ impl FileHeader {
     ///
     /// # Errors
     /// Frames of another shape, variable or unit of samples or places, or where other values stand for missing samples.
-    pub(super) fn follows(&self, first: &Self, name: &str) -> Advised<Mismatch> {
+    pub(crate) fn follows(&self, first: &Self, name: &str) -> Advised<Mismatch> {
         let said = |text: &Option<String>| text.clone().unwrap_or_else(|| "none".into());
         let value = |missing: Option<f64>| missing.map_or_else(|| "none".into(), |value| value.to_string());
         let same = |what: &str, own: String, theirs: String| {
@@ -135,16 +135,16 @@ impl FileHeader {
 
 /// Differences from the first file that are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Mismatch {
+pub(crate) struct Mismatch {
     /// Its spacing or origin.
-    pub(super) grid: bool,
+    pub(crate) grid: bool,
     /// What its times are measured in, or since when, or by which calendar.
-    pub(super) times: bool,
+    pub(crate) times: bool,
 }
 
 /// Checks that a file of `len` bytes holds `frames` frames of numbers of this type from byte `start` and nothing after
 /// them.
-pub(super) fn check_size(len: u64, start: u64, shape: &Shape, ty: StoredType, frames: usize) -> Parsed<()> {
+pub(crate) fn check_size(len: u64, start: u64, shape: &Shape, ty: StoredType, frames: usize) -> Parsed<()> {
     let [x, y, z] = shape.dims();
     let frame = (x * y * z) as u64 * ty.size() as u64; // fits: a sample has at least half the bytes
     let payload = frame.checked_mul(frames as u64);
@@ -170,7 +170,7 @@ fn other_sample(found: u64, voxels: u64, frames: usize) -> Option<String> {
 }
 
 /// The first bytes of a file, fewer if it is shorter.
-pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
+pub(crate) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
     let len = usize::try_from(file.len()).unwrap_or(usize::MAX).min(bytes);
     let mut head = vec![0; len];
     file.read_at(0, &mut head).map_err(|e| Error::io(file.path(), "reading the header", e))?;
@@ -179,7 +179,7 @@ pub(super) fn head(file: &FileBytes, bytes: usize) -> Result<Vec<u8>> {
 
 /// Reads a header of unknown length: reads more until `parse` finds its end. The flag says whether it has the whole
 /// file.
-pub(super) fn growing_head<T>(file: &FileBytes, parse: impl Fn(&[u8], bool) -> Parsed<Option<T>>) -> Result<T> {
+pub(crate) fn growing_head<T>(file: &FileBytes, parse: impl Fn(&[u8], bool) -> Parsed<Option<T>>) -> Result<T> {
     let mut len = FIRST_READ;
     loop {
         let bytes = head(file, len)?;

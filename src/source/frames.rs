@@ -1,10 +1,10 @@
 //! A window of frames whose bytes are at known places. All formats copy boxes with it.
 
 use super::FrameWindow;
+use super::int64;
 use super::layout::Shape;
 use super::parts::Stored;
 use super::spill_buffer::SpillBuffer;
-use super::wide;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::mapped::{FileBytes, State};
@@ -24,7 +24,7 @@ const MAX_SPAN: usize = 64 << 10;
 
 /// Where the bytes of some frames are.
 #[derive(Debug)]
-pub(super) enum Bytes {
+pub(crate) enum Bytes {
     /// Directly in a file.
     File(FileBytes),
     /// Copied from a stream, or decoded from a file of this state. The file is closed: a window may have many files.
@@ -63,24 +63,24 @@ impl Bytes {
 
 /// One frame: its place in the bytes of a window.
 #[derive(Debug)]
-pub(super) struct Frame {
+pub(crate) struct Frame {
     /// Which of the window's bytes hold it.
-    pub(super) bytes: usize,
+    pub(crate) bytes: usize,
     /// Where its voxel (0, 0, 0) is there.
-    pub(super) offset: u64,
+    pub(crate) offset: u64,
     /// Its name for messages.
-    pub(super) name: String,
+    pub(crate) name: String,
 }
 
 /// Some consecutive frames.
 #[derive(Debug)]
-pub(super) struct Frames {
+pub(crate) struct Frames {
     /// Voxels and sample type of each.
-    pub(super) shape: Shape,
+    pub(crate) shape: Shape,
     /// Where their samples are, and how they are stored there.
-    pub(super) bytes: Vec<(Bytes, Stored)>,
+    pub(crate) bytes: Vec<(Bytes, Stored)>,
     /// The frames, in order.
-    pub(super) frames: Vec<Frame>,
+    pub(crate) frames: Vec<Frame>,
 }
 
 impl FrameWindow for Frames {
@@ -93,14 +93,14 @@ impl FrameWindow for Frames {
         assert!(Region { start: [0; 3], end: dims }.contains(region), "{region:?} is not inside {dims:?}");
         assert_eq!(out.len(), region.voxels() * sample.size(), "bytes of {region:?}");
         let Stored { ty, packing, .. } = &self.bytes[self.frames[frame].bytes].1;
-        if packing.is_none() && !ty.is_wide() {
+        if packing.is_none() && !ty.is_64_bit() {
             return self.read_stored(frame, region, out);
         }
         let mut numbers = vec![0; region.voxels() * ty.size()];
         self.read_stored(frame, region, &mut numbers)?;
         let converted = match packing {
             Some(packing) => packing.unpack(*ty, &numbers, out),
-            None => wide::narrow(*ty, &numbers, out),
+            None => int64::narrow(*ty, &numbers, out),
         };
         converted.map_err(|unfit| {
             let voxel = region.iter().nth(unfit.index).unwrap_or_default();
@@ -119,7 +119,7 @@ impl FrameWindow for Frames {
 
 impl Frames {
     /// Bytes of memory that hold what was decoded.
-    pub(super) fn memory(&self) -> usize {
+    pub(crate) fn memory(&self) -> usize {
         let held = |(bytes, _): &(Bytes, Stored)| match bytes {
             Bytes::SpillBuffer { data, .. } => data.memory(),
             Bytes::File(_) => 0,
@@ -290,8 +290,9 @@ fn flattened(dims: [usize; 3], region: &Region) -> ([usize; 3], Region) {
 mod tests {
     use super::super::testing::{DIMS, check_window, payload};
     use super::*;
+    use crate::base::description::AxisRole;
     use crate::base::sample::SampleType;
-    use crate::source::layout::{Axis, Counts, Layout, Strides};
+    use crate::source::layout::{Axis, Layout, Strides};
     use crate::source::packing::Packing;
 
     /// Large enough that some boxes are read row by row and some joined.
@@ -351,9 +352,11 @@ mod tests {
         let voxels = payload(ty, 0..1, false);
         for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
             for turned in 0..8 {
-                let axis =
-                    |of: usize| Axis { backwards: turned >> of & 1 == 1, ..Axis::new(Counts::Voxels(of), DIMS[of]) };
-                let layout = Layout([vec![Axis::new(Counts::Only(1), 2)], order.map(axis).to_vec()].concat());
+                let axis = |of: usize| Axis {
+                    backwards: turned >> of & 1 == 1,
+                    ..Axis::new(AxisRole::of_voxels(of), DIMS[of])
+                };
+                let layout = Layout([vec![Axis::single(1, 2)], order.map(axis).to_vec()].concat());
                 let stored = Stored::new(&layout, ty, false).expect("small");
                 let mut bytes = vec![0; stored.bytes];
                 for (i, [x, y, z]) in (Region { start: [0; 3], end: DIMS }).iter().enumerate() {

@@ -1,11 +1,12 @@
 //! What a frame is made of, and how the samples of some frames lie in an array: axes in any order and direction.
 
 use super::Parsed;
+use crate::base::description::AxisRole;
 use crate::base::sample::SampleType;
 
 /// The voxels and the sample type of every frame of an archive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
+pub(crate) struct Shape {
     dims: [usize; 3],
     sample: SampleType,
     frame_bytes: usize,
@@ -13,7 +14,7 @@ pub(super) struct Shape {
 
 impl Shape {
     /// Refuses empty frames and those whose bytes cannot be addressed, with the reason.
-    pub(super) fn new(dims: [usize; 3], sample: SampleType) -> Parsed<Self> {
+    pub(crate) fn new(dims: [usize; 3], sample: SampleType) -> Parsed<Self> {
         let [x, y, z] = dims;
         if dims.contains(&0) {
             return Err(format!("a frame of {x}x{y}x{z} voxels is empty"));
@@ -25,17 +26,17 @@ impl Shape {
     }
 
     /// Voxels along x, y, z.
-    pub(super) fn dims(&self) -> [usize; 3] {
+    pub(crate) fn dims(&self) -> [usize; 3] {
         self.dims
     }
 
     /// The type of the samples.
-    pub(super) fn sample(&self) -> SampleType {
+    pub(crate) fn sample(&self) -> SampleType {
         self.sample
     }
 
     /// Bytes of one frame.
-    pub(super) fn frame_bytes(&self) -> usize {
+    pub(crate) fn frame_bytes(&self) -> usize {
         self.frame_bytes
     }
 }
@@ -47,66 +48,63 @@ impl std::fmt::Display for Shape {
     }
 }
 
-/// What an axis counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Counts {
-    /// Frames.
-    Frames,
-    /// Voxels along x (0), y (1) or z (2).
-    Voxels(usize),
-    /// Something else, with this index chosen: a component, or a member of an ensemble.
-    Only(usize),
-}
-
 /// An axis of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Axis {
-    pub(super) counts: Counts,
+pub(crate) struct Axis {
+    /// What it counts; single if that is neither frames nor voxels, but components, say.
+    pub(crate) role: AxisRole,
     /// At least 1.
-    pub(super) len: usize,
+    pub(crate) len: usize,
+    /// The chosen item of a single axis.
+    pub(crate) index: usize,
     /// Whether voxels are stored from the last to the first.
-    pub(super) backwards: bool,
+    pub(crate) backwards: bool,
 }
 
 impl Axis {
     /// An axis that is stored from its first to its last.
-    pub(super) fn new(counts: Counts, len: usize) -> Self {
-        Self { counts, len, backwards: false }
+    pub(crate) fn new(role: AxisRole, len: usize) -> Self {
+        Self { role, len, index: 0, backwards: false }
+    }
+
+    /// An axis that counts neither frames nor voxels, of which one item is chosen.
+    pub(crate) fn single(index: usize, len: usize) -> Self {
+        Self { index, ..Self::new(AxisRole::Single, len) }
     }
 }
 
 /// The axes of an array, the slowest first. Axes that it lacks have a length of 1.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Layout(pub(super) Vec<Axis>);
+pub(crate) struct Layout(pub(crate) Vec<Axis>);
 
 impl Layout {
     /// Frames one after another, z slowest and x fastest.
-    pub(super) fn plain([x, y, z]: [usize; 3], frames: usize) -> Self {
-        let axes = [(Counts::Frames, frames), (Counts::Voxels(2), z), (Counts::Voxels(1), y), (Counts::Voxels(0), x)];
-        Self(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec())
+    pub(crate) fn plain([x, y, z]: [usize; 3], frames: usize) -> Self {
+        let axes = [(AxisRole::Frames, frames), (AxisRole::Z, z), (AxisRole::Y, y), (AxisRole::X, x)];
+        Self(axes.map(|(role, len)| Axis::new(role, len)).to_vec())
     }
 
     /// The length of the axis that counts this.
-    pub(super) fn len(&self, counts: Counts) -> usize {
-        self.0.iter().find(|axis| axis.counts == counts).map_or(1, |axis| axis.len)
+    pub(crate) fn len(&self, role: AxisRole) -> usize {
+        self.0.iter().find(|axis| axis.role == role).map_or(1, |axis| axis.len)
     }
 
     /// Voxels along x, y, z.
-    pub(super) fn dims(&self) -> [usize; 3] {
-        [0, 1, 2].map(|axis| self.len(Counts::Voxels(axis)))
+    pub(crate) fn dims(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| self.len(AxisRole::of_voxels(axis)))
     }
 
     /// The same array of another number of frames.
-    pub(super) fn with_frames(mut self, frames: usize) -> Self {
-        self.0.iter_mut().filter(|axis| axis.counts == Counts::Frames).for_each(|axis| axis.len = frames);
+    pub(crate) fn with_frames(mut self, frames: usize) -> Self {
+        self.0.iter_mut().filter(|axis| axis.role == AxisRole::Frames).for_each(|axis| axis.len = frames);
         self
     }
 
     /// Drops the slowest axes with a chosen index. Returns the number of samples before the chosen part, and the layout
     /// of that part.
-    pub(super) fn chosen_part(&self) -> (usize, Self) {
+    pub(crate) fn chosen_part(&self) -> (usize, Self) {
         let (mut before, mut rest) = (0, self.clone());
-        while let Some(Axis { counts: Counts::Only(index), .. }) = rest.0.first().copied() {
+        while let Some(Axis { role: AxisRole::Single, index, .. }) = rest.0.first().copied() {
             rest.0.remove(0);
             before += index * rest.0.iter().map(|axis| axis.len).product::<usize>();
         }
@@ -114,13 +112,13 @@ impl Layout {
     }
 
     /// Bytes of the whole array.
-    pub(super) fn bytes(&self, size: usize) -> Parsed<usize> {
+    pub(crate) fn bytes(&self, size: usize) -> Parsed<usize> {
         let bytes = self.0.iter().try_fold(size, |bytes, axis| bytes.checked_mul(axis.len));
         bytes.filter(|n| isize::try_from(*n).is_ok()).ok_or_else(|| "an array of its size is too large".into())
     }
 
     /// Where samples of `size` bytes are.
-    pub(super) fn strides(&self, size: usize) -> Parsed<Strides> {
+    pub(crate) fn strides(&self, size: usize) -> Parsed<Strides> {
         self.bytes(size)?;
         let mut strides = Strides { first: 0, frame: 0, voxel: [0; 3] };
         let mut stride = size as i64;
@@ -128,10 +126,10 @@ impl Layout {
             let last = stride * (axis.len as i64 - 1);
             let signed = if axis.backwards { -stride } else { stride };
             strides.first += if axis.backwards { last as u64 } else { 0 };
-            match axis.counts {
-                Counts::Frames => strides.frame = stride as u64,
-                Counts::Voxels(of) => strides.voxel[of] = signed,
-                Counts::Only(index) => strides.first += stride as u64 * index as u64,
+            match (axis.role, axis.role.voxels()) {
+                (AxisRole::Frames, _) => strides.frame = stride as u64,
+                (_, Some(along)) => strides.voxel[along] = signed,
+                (_, None) => strides.first += stride as u64 * axis.index as u64,
             }
             stride *= axis.len as i64;
         }
@@ -141,18 +139,18 @@ impl Layout {
 
 /// Bytes from one sample of an array to others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Strides {
+pub(crate) struct Strides {
     /// From the array's first byte to voxel (0, 0, 0) of its first frame.
-    pub(super) first: u64,
+    pub(crate) first: u64,
     /// To the next frame.
-    pub(super) frame: u64,
+    pub(crate) frame: u64,
     /// To the next voxel along x, y, z.
-    pub(super) voxel: [i64; 3],
+    pub(crate) voxel: [i64; 3],
 }
 
 impl Strides {
     /// Whether the voxels of a frame of these dimensions are contiguous, x fastest, then y and z.
-    pub(super) fn is_plain(&self, dims: [usize; 3], size: usize) -> bool {
+    pub(crate) fn is_plain(&self, dims: [usize; 3], size: usize) -> bool {
         self.voxel == [size, size * dims[0], size * dims[0] * dims[1]].map(|n| n as i64)
     }
 }
@@ -163,8 +161,8 @@ mod tests {
 
     #[test]
     fn strides_lead_to_every_sample() {
-        let axes = [(Counts::Voxels(0), 3), (Counts::Only(1), 2), (Counts::Frames, 5), (Counts::Voxels(2), 4)];
-        let mut layout = Layout(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec());
+        let (frames, z) = (Axis::new(AxisRole::Frames, 5), Axis::new(AxisRole::Z, 4));
+        let mut layout = Layout(vec![Axis::new(AxisRole::X, 3), Axis::single(1, 2), frames, z]);
         layout.0[3].backwards = true;
         let strides = layout.strides(2).expect("small");
         let index = |x: u64, t: u64, z: u64| ((x * 2 + 1) * 5 + t) * 4 + (3 - z);
@@ -179,8 +177,8 @@ mod tests {
 
     #[test]
     fn the_chosen_part_comes_after_the_indices_before_it() {
-        let axes = [(Counts::Only(1), 2), (Counts::Only(3), 4), (Counts::Frames, 5), (Counts::Only(0), 3)];
-        let layout = Layout(axes.map(|(counts, len)| Axis::new(counts, len)).to_vec());
+        let frames = Axis::new(AxisRole::Frames, 5);
+        let layout = Layout(vec![Axis::single(1, 2), Axis::single(3, 4), frames, Axis::single(0, 3)]);
         assert_eq!(layout.chosen_part(), (4 * 5 * 3 + 3 * 5 * 3, Layout(layout.0[2..].to_vec())));
     }
 

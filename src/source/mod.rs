@@ -1,41 +1,31 @@
-//! Reads files of frames of many formats through one trait, [`FrameSource`].
+//! Frames in order behind one trait, [`FrameSource`], wherever they come from.
 //!
-//! A format (`formats`) describes where the frames of a file are or how to decode them, in any order of axes
-//! (`layout`). A source describes its [`Archive`] and returns windows of frames in order. A window copies boxes of
-//! samples. Nothing here depends on wavelets or blocks. [`open`] chooses the source by name and content.
+//! A source describes its [`Archive`] and returns windows of frames in order. A window copies boxes of samples. A file's
+//! header says where its frames are or how to decode them (`parts`), in any order of axes (`layout`). Nothing here
+//! depends on formats, wavelets or blocks: `formats` reads headers and opens files.
 
 mod array;
 mod colour_transform;
-mod file_header;
-mod formats;
-mod frames;
-mod spill_buffer;
-mod inputs;
-mod layout;
-mod magnitude;
-mod numbering;
-mod packing;
-mod parts;
-pub(crate) mod ends;
+pub(crate) mod extremes;
+pub(crate) mod file_header;
+pub(crate) mod frames;
+mod int64;
+pub(crate) mod layout;
+pub(crate) mod packing;
+pub(crate) mod parts;
 pub(crate) mod scan;
 mod select;
-mod series;
-mod stream;
+pub(crate) mod series;
+pub(crate) mod spill_buffer;
 #[cfg(test)]
-mod testing;
-mod times;
-mod variables;
-mod wide;
+pub(crate) mod testing;
+pub(crate) mod times;
+pub(crate) mod variables;
 
 pub use array::ArraySource;
 pub(crate) use colour_transform::ColourWindow;
 pub use colour_transform::{CHANNELS, ColourTransform};
 pub use file_header::Units;
-pub use formats::arrays::held::{ArrayType, NamedArray, NamedArrays};
-#[doc(hidden)]
-pub use formats::{ArrayHeader, array_header, extensions};
-#[doc(hidden)]
-pub use inputs::files;
 pub use scan::value_range;
 pub use select::{Selection, select};
 pub use times::{GivenTimes, RegularTimes, with_times};
@@ -45,23 +35,19 @@ use crate::base::description::Description;
 use crate::base::error::{Note, Result};
 use crate::base::grid::{Grid, Region};
 use crate::base::mapped::Access;
-use crate::base::output::STANDARD;
 use crate::base::sample::SampleType;
 use crate::base::time_labels::TimeLabels;
-use std::io::Read;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// A result for one file. The error is a text that follows the file's name.
-type Parsed<T> = std::result::Result<T, String>;
+pub(crate) type Parsed<T> = std::result::Result<T, String>;
 
 /// As [`Parsed`], with a remedy in the error.
-type Advised<T> = std::result::Result<T, Note>;
+pub(crate) type Advised<T> = std::result::Result<T, Note>;
 
 /// What a header is read for, beside samples and times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Extent {
+pub(crate) enum Extent {
     /// Everything.
     Whole,
     /// What differs between frames: the file is not the first of an archive.
@@ -136,77 +122,9 @@ impl Default for OpenOptions {
 
 impl OpenOptions {
     /// Without what is for headerless data only.
-    fn for_headers(&self) -> Self {
+    pub(crate) fn for_headers(&self) -> Self {
         Self { dims: None, sample: None, big_endian: false, offset: 0, ..self.clone() }
     }
-}
-
-/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`,
-/// `.series`), or `-` for standard input.
-///
-/// The header and size of every file are checked here; samples are read by [`FrameSource::window`].
-///
-/// # Errors
-/// Files that are absent, damaged, of a format or with a feature that is not supported, or unlike the first one;
-/// numbers in names that suggest a missing frame; options that do not apply to the format.
-pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    if let [only] = inputs
-        && only == Path::new(STANDARD)
-    {
-        return open_stream(std::io::stdin(), options);
-    }
-    if !options.magnitude.is_empty() {
-        return magnitude::open(inputs, options);
-    }
-    if options.dims_are_remembered && inputs::have_headers(inputs, options) {
-        return open_files(inputs, &options.for_headers());
-    }
-    open_files(inputs, options)
-}
-
-fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    let files = inputs::expand(inputs, options)?;
-    Ok(Box::new(series::Series::open(&files, options)?))
-}
-
-/// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A
-/// stream has one.
-///
-/// # Errors
-/// Files that are absent, damaged or of a format that is not supported.
-pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
-    if options.variable.is_some()
-        || !options.magnitude.is_empty()
-        || options.dims.is_some()
-        || inputs == [Path::new(STANDARD)]
-    {
-        return Ok(Vec::new());
-    }
-    formats::undecided(&inputs::expand(inputs, options)?.paths[0], options)
-}
-
-/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`, or one for each
-/// frame.
-///
-/// # Errors
-/// As [`open`]; messages call the stream `-`.
-pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    Ok(Box::new(stream::Stream::open(reader, options)?))
-}
-
-/// Opens named arrays that the caller holds or computes; `name` stands for them in messages. The variable is chosen, and
-/// the meaning of its axes found, as for a NetCDF file. So converting it gives the bytes that the file would give.
-///
-/// # Errors
-/// No variable with three axes, or several; options for headerless data.
-pub fn open_arrays(
-    name: impl AsRef<Path>,
-    arrays: &Arc<dyn NamedArrays>,
-    options: &OpenOptions,
-) -> Result<Box<dyn FrameSource>> {
-    let name = name.as_ref();
-    let header = formats::arrays::held::describe(name, arrays, options)?;
-    Ok(Box::new(series::Series::single(header, name, options)?))
 }
 
 /// What an archive holds, known before any frame is read.

@@ -1,32 +1,32 @@
 //! Stored numbers that are scaled and have missing values.
 
-use super::wide::{self, Unfit};
+use super::int64::{self, Unfit};
 use crate::base::sample::{self, SampleType};
 use crate::base::stored::StoredType;
 
 /// How stored numbers become samples: `stored * scale + offset`, NaN for what is missing.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Packing {
-    pub(super) scale: f64,
-    pub(super) offset: f64,
+pub(crate) struct Packing {
+    pub(crate) scale: f64,
+    pub(crate) offset: f64,
     /// Stored numbers that stand for missing samples.
-    pub(super) missing: Vec<f64>,
+    pub(crate) missing: Vec<f64>,
     /// The least and the largest stored number that is valid.
-    pub(super) valid: (f64, f64),
+    pub(crate) valid: (f64, f64),
 }
 
 impl Packing {
     /// Numbers as they are.
-    pub(super) const NONE: Self =
+    pub(crate) const NONE: Self =
         Self { scale: 1.0, offset: 0.0, missing: Vec::new(), valid: (f64::NEG_INFINITY, f64::INFINITY) };
 
     /// Numbers that are scaled.
-    pub(super) fn scaled(scale: f64, offset: f64) -> Self {
+    pub(crate) fn scaled(scale: f64, offset: f64) -> Self {
         Self { scale, offset, ..Self::NONE }
     }
 
     /// The type of the samples: f32 if it is fine enough for the scaled numbers, else f64.
-    pub(super) fn sample(&self, stored: SampleType) -> SampleType {
+    pub(crate) fn sample(&self, stored: SampleType) -> SampleType {
         let fine = self.scale.abs() / 4.0;
         match stored {
             SampleType::U32 | SampleType::I32 | SampleType::F64 => SampleType::F64,
@@ -36,7 +36,7 @@ impl Packing {
     }
 
     /// The sample of a stored number.
-    pub(super) fn value(&self, stored: f64) -> f64 {
+    pub(crate) fn value(&self, stored: f64) -> f64 {
         let valid = self.valid.0 <= stored && stored <= self.valid.1 && !self.missing.contains(&stored);
         if valid { stored * self.scale + self.offset } else { f64::NAN }
     }
@@ -46,9 +46,11 @@ impl Packing {
     ///
     /// # Errors
     /// Integers of 64 bits that are not exactly a sample.
-    pub(super) fn unpack(&self, stored: StoredType, bytes: &[u8], out: &mut [u8]) -> Result<(), Unfit> {
-        let StoredType::Sample(stored) = stored else { return wide::unpack(stored, self, bytes, out) };
-        let ty = self.sample(stored);
+    pub(crate) fn unpack(&self, stored: StoredType, bytes: &[u8], out: &mut [u8]) -> Result<(), Unfit> {
+        if stored.is_64_bit() {
+            return int64::unpack(stored, self, bytes, out);
+        }
+        let (stored, ty) = (stored.sample(), self.sample(stored.sample()));
         let mut values = Vec::new();
         sample::for_each_run(stored, bytes, |first, numbers| {
             values.clear();

@@ -1,7 +1,7 @@
 //! Where the frames of a file are: in the file as they are, or to be decoded first.
 
 use super::Parsed;
-use super::layout::{Layout, Shape, Strides};
+use super::layout::{Layout, Strides};
 use super::packing::Packing;
 use super::spill_buffer::SpillBuffer;
 use crate::base::error::Result;
@@ -13,64 +13,51 @@ use std::path::{Path, PathBuf};
 
 /// Some frames in one file.
 #[derive(Debug)]
-pub(super) struct Part {
+pub(crate) struct Part {
     /// The file.
-    pub(super) path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Its state when it was checked.
-    pub(super) state: State,
+    pub(crate) state: State,
     /// Number of frames.
-    pub(super) frames: usize,
+    pub(crate) frames: usize,
     /// How they are stored, once they are decoded.
-    pub(super) stored: Stored,
+    pub(crate) stored: Stored,
     /// Where the bytes begin.
-    pub(super) at: DataLocation,
-}
-
-impl Part {
-    /// Frames one after another from a byte of a file, x fastest.
-    pub(super) fn plain(
-        (path, state): (&Path, State),
-        (shape, frames): (&Shape, usize),
-        big_endian: bool,
-        start: u64,
-    ) -> Parsed<Self> {
-        let stored = Stored::plain(shape.dims(), frames, shape.sample(), big_endian)?;
-        Ok(Self { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) })
-    }
+    pub(crate) at: DataLocation,
 }
 
 /// How the samples of some frames are stored.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Stored {
+pub(crate) struct Stored {
     /// The type of the stored numbers.
-    pub(super) ty: StoredType,
+    pub(crate) ty: StoredType,
     /// Whether these have their most significant byte first.
-    pub(super) big_endian: bool,
+    pub(crate) big_endian: bool,
     /// Byte steps between voxels and frames.
-    pub(super) strides: Strides,
+    pub(crate) strides: Strides,
     /// Bytes of all of them.
-    pub(super) bytes: usize,
+    pub(crate) bytes: usize,
     /// How they become samples; None if they are the samples.
-    pub(super) packing: Option<Packing>,
+    pub(crate) packing: Option<Packing>,
 }
 
 impl Stored {
     /// Samples in the order of an array, as they are.
-    pub(super) fn new(layout: &Layout, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
+    pub(crate) fn new(layout: &Layout, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
         let ty = ty.into();
         let (strides, bytes) = (layout.strides(ty.size())?, layout.bytes(ty.size())?);
         Ok(Self { ty, big_endian, strides, bytes, packing: None })
     }
 
     /// Frames one after another, x fastest.
-    pub(super) fn plain(dims: [usize; 3], frames: usize, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
+    pub(crate) fn plain(dims: [usize; 3], frames: usize, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
         Self::new(&Layout::plain(dims, frames), ty, big_endian)
     }
 }
 
 /// Where the bytes of a part are.
 #[derive(Debug)]
-pub(super) enum DataLocation {
+pub(crate) enum DataLocation {
     /// In the file as they are, from this byte.
     Byte(u64),
     /// In the file, but packed.
@@ -78,7 +65,7 @@ pub(super) enum DataLocation {
 }
 
 /// Frames that must be decoded before boxes can be read.
-pub(super) trait Decode: Debug + Send {
+pub(crate) trait Decode: Debug + Send {
     /// Frames that are packed together and decoded at once, counted from the part's first. [`Part::stored`] describes
     /// this many.
     fn frames_per_chunk(&self) -> usize {

@@ -4,7 +4,7 @@ use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
 use crate::base::progress::Progress;
 use crate::base::sample::{self, SampleType, join_ranges};
-use crate::source::ends::Ends;
+use crate::source::extremes::ExtremeCounts;
 use crate::source::{FrameSource, FrameWindow};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
@@ -15,7 +15,7 @@ pub(crate) struct Scan {
     /// Range of the samples that are not missing; (inf, -inf) if all are.
     pub(crate) range: (f64, f64),
     /// How often the smallest and the largest value occur, and the next values.
-    pub(crate) ends: Ends,
+    pub(crate) extremes: ExtremeCounts,
     /// Missing samples.
     pub(crate) missing: u64,
     /// The first of them: frame within the window, and index of the voxel within the frame.
@@ -27,7 +27,7 @@ pub(crate) struct Scan {
 impl Scan {
     pub(crate) const NOTHING: Self = Self {
         range: (f64::INFINITY, f64::NEG_INFINITY),
-        ends: Ends::NONE,
+        extremes: ExtremeCounts::NONE,
         missing: 0,
         first_missing: None,
         digest: 0,
@@ -40,7 +40,7 @@ impl Scan {
         digests[8..].copy_from_slice(&next.digest.to_le_bytes());
         Self {
             range: join_ranges(self.range, next.range),
-            ends: self.ends.join(next.ends),
+            extremes: self.extremes.join(next.extremes),
             missing: self.missing + next.missing,
             first_missing: self.first_missing.or(next.first_missing),
             digest: xxh3_64_with_seed(&digests, 0),
@@ -100,22 +100,23 @@ pub(crate) fn scan_frame(
             let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
             bytes.resize(run.voxels() * ty.size(), 0);
             window.read_box(frame, &run, bytes)?;
-            Ok(scan_run(bytes, ty, declared, (frame, (z * ny + y) * nx)))
+            Ok(scan_run(bytes, ty, declared, frame, (z * ny + y) * nx))
         })
         .collect();
     Ok(runs?.into_iter().fold(seen, Scan::then))
 }
 
-fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, (frame, at): (usize, usize)) -> Scan {
+/// Looks at a run of a frame's samples; `at` is the index of its first voxel.
+fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, frame: usize, at: usize) -> Scan {
     let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), ..Scan::NOTHING };
-    let (mut range, mut ends) = (seen.range, seen.ends);
+    let (mut range, mut extremes) = (seen.range, seen.extremes);
     let missing = |i| {
         seen.missing += 1;
         seen.first_missing.get_or_insert((frame, at + i));
     };
     sample::for_each_present(ty, bytes, declared, missing, |values, run| {
         range = join_ranges(range, run);
-        ends.add(values, run);
+        extremes.add(values, run.0, run.1);
     });
-    Scan { range, ends, ..seen }
+    Scan { range, extremes, ..seen }
 }

@@ -41,7 +41,7 @@ pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<
     archive.frames = selection.frames;
     archive.times = archive.times.iter().skip(selection.first).step_by(selection.step).copied().collect();
     archive.times.truncate(selection.frames.unwrap_or(usize::MAX));
-    archive.regular_times = archive.regular_times.map(|times| times.of(selection.first, selection.step));
+    archive.regular_times = archive.regular_times.map(|times| times.stepped(selection.first, selection.step));
     Ok(Box::new(Selected { source, archive, selection }))
 }
 
@@ -87,7 +87,7 @@ impl FrameWindow for SelectedWindow {
 }
 
 /// Every `step`-th frame of a window from its first, at most `count` of them.
-pub(super) fn stepped(window: Box<dyn FrameWindow>, count: usize, step: usize) -> Box<dyn FrameWindow> {
+pub(crate) fn stepped(window: Box<dyn FrameWindow>, count: usize, step: usize) -> Box<dyn FrameWindow> {
     let frames = window.frames().div_ceil(step).min(count);
     Box::new(SteppedWindow { window, frames, step })
 }

@@ -2,23 +2,46 @@
 
 use super::file_header::FileHeader;
 use super::frames::{Bytes, Frame, Frames};
-use super::inputs::FrameFiles;
 use super::layout::Shape;
 use super::parts::{DataLocation, Part};
 use super::spill_buffer::{SpillBuffer, Spool};
-use super::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, formats, times};
+use super::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, Parsed, times};
 use crate::base::description::{Description, Values, extended, is_of, joined};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
 use std::mem;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// The files of an archive, in order.
+#[derive(Debug, Default)]
+pub(crate) struct FrameFiles {
+    /// The files, at least one, none twice.
+    pub(crate) paths: Vec<PathBuf>,
+    /// Time of each where a list says so, else empty.
+    pub(crate) times: Vec<f64>,
+    /// What a user should know about how they were found.
+    pub(crate) notes: Vec<Note>,
+}
+
+impl FrameFiles {
+    /// An error if a list contradicts itself in its times.
+    pub(crate) fn checked(self) -> Parsed<Self> {
+        if !self.times.is_empty() && self.times.len() != self.paths.len() {
+            return Err("gives a time to some of its files only".into());
+        }
+        if let Some(at) = self.times.windows(2).position(|t| t[0] == t[1]) {
+            return Err(format!("lists two files for the time {}; one is supported", self.times[at]));
+        }
+        Ok(self)
+    }
+}
 
 /// Files whose frames follow one another.
 #[derive(Debug)]
-pub(super) struct Series {
+pub(crate) struct Series {
     archive: Archive,
     shape: Shape,
     access: Access,
@@ -37,21 +60,33 @@ struct Decoded {
     data: Arc<SpillBuffer>,
 }
 
+/// A frame of a part, and the byte at which it begins where its samples are.
+#[derive(Clone, Copy)]
+struct PartStart {
+    frame: usize,
+    byte: u64,
+}
+
 impl Series {
-    /// Reads the header of every file.
-    pub(super) fn open(files: &FrameFiles, options: &OpenOptions) -> Result<Self> {
+    /// Reads the header of every file by `describe`.
+    pub(crate) fn open(
+        files: &FrameFiles,
+        options: &OpenOptions,
+        describe: impl Fn(&Path, Extent) -> Result<FileHeader>,
+    ) -> Result<Self> {
+        let describe = |path: &Path, extent| describe(path, extent).map(|header| on_grid_of_user(header, options));
         let Some((first_path, rest)) = files.paths.split_first() else {
             return Err(Error::setting("inputs", "no input was given"));
         };
-        let mut first = describe(first_path, options, Extent::Whole)?;
+        let mut first = describe(first_path, Extent::Whole)?;
         if !rest.is_empty() || first.parts.len() > 1 {
             first.stack_frames();
         }
-        let mut series = Self::of(&mut first, options);
+        let mut series = Self::starting_with(&mut first, options);
         let name = format!("the first frame ({})", first_path.display());
         let (mut placed_otherwise, mut timed_otherwise, mut more) = (None, None, Vec::new());
         for path in rest {
-            let mut file = describe(path, options, Extent::AlongTime)?;
+            let mut file = describe(path, Extent::AlongTime)?;
             let unlike = file.follows(&first, &name).map_err(|e| Error::input(path, e))?;
             placed_otherwise = placed_otherwise.or(unlike.grid.then_some(path));
             if unlike.times {
@@ -73,18 +108,16 @@ impl Series {
     }
 
     /// The frames that one header describes. Messages call where they are from `name`.
-    pub(super) fn single(mut header: FileHeader, name: &Path, options: &OpenOptions) -> Result<Self> {
+    pub(crate) fn single(mut header: FileHeader, name: &Path, options: &OpenOptions) -> Result<Self> {
         if header.parts.len() > 1 {
             header.stack_frames();
         }
-        let mut grid = header.grid();
-        override_grid(&mut grid, options);
-        (header.spacing, header.origin) = (grid.spacing, grid.origin);
+        header = on_grid_of_user(header, options);
         let files = FrameFiles { paths: vec![name.into()], times: Vec::new(), notes: Vec::new() };
-        Self::of(&mut header, options).finish(&files, None, options)
+        Self::starting_with(&mut header, options).finish(&files, None, options)
     }
 
-    fn of(first: &mut FileHeader, options: &OpenOptions) -> Self {
+    fn starting_with(first: &mut FileHeader, options: &OpenOptions) -> Self {
         let archive = Archive {
             variable: first.variable.clone(),
             units: first.units.clone(),
@@ -197,14 +230,15 @@ impl Series {
     }
 
     /// Adds some frames of a part, ascending, to a window.
-    fn add(&mut self, part: usize, wanted: &[usize], (window, spool): (&mut Frames, &mut Spool)) -> Result<()> {
+    fn add(&mut self, part: usize, wanted: &[usize], window: &mut Frames, spool: &mut Spool) -> Result<()> {
         let Part { path, state, at, .. } = &self.parts[part];
         let (path, state) = (path.clone(), *state);
         let together = match at {
             DataLocation::Byte(start) => {
                 let file = FileBytes::open(&path, self.access)?;
                 state.check(&path, &file.state())?;
-                self.push(part, (0, *start), wanted, Bytes::File(file), window);
+                let from = PartStart { frame: 0, byte: *start };
+                self.push(part, from, wanted, Bytes::File(file), window);
                 return Ok(());
             }
             DataLocation::Decoded(decoder) => decoder.frames_per_chunk(),
@@ -213,39 +247,35 @@ impl Series {
         for wanted in wanted.chunk_by(|a, b| a / together == b / together) {
             let first = wanted[0] - wanted[0] % together;
             let room = self.memory.saturating_sub(window.memory());
-            let data = self.decoded(part, (first, together), room, spool)?;
+            let data = self.decoded(part, first, room, spool)?;
             let file = Some((path.clone(), state));
-            self.push(part, (first, 0), wanted, Bytes::SpillBuffer { data, file }, window);
+            let from = PartStart { frame: first, byte: 0 };
+            self.push(part, from, wanted, Bytes::SpillBuffer { data, file }, window);
         }
         Ok(())
     }
 
-    /// Adds frames that are in some bytes, where the part's frame `first` begins at `start`.
-    fn push(&self, part: usize, (first, start): (usize, u64), frames: &[usize], bytes: Bytes, window: &mut Frames) {
+    /// Adds frames that are in some bytes.
+    fn push(&self, part: usize, from: PartStart, frames: &[usize], bytes: Bytes, window: &mut Frames) {
         let Part { path, stored, frames: all, .. } = &self.parts[part];
         for &index in frames {
             let path = path.display();
             let name = if *all == 1 { path.to_string() } else { format!("{path}, frame {index}") };
-            let offset = start + stored.strides.first + (index - first) as u64 * stored.strides.frame;
+            let offset = from.byte + stored.strides.first + (index - from.frame) as u64 * stored.strides.frame;
             window.frames.push(Frame { bytes: window.bytes.len(), offset, name });
         }
         window.bytes.push((bytes, stored.clone()));
     }
 
     /// The frames of a part from `first` on that are packed together, in memory if there is `room`.
-    fn decoded(
-        &mut self,
-        part: usize,
-        (first, together): (usize, usize),
-        room: usize,
-        spool: &mut Spool,
-    ) -> Result<Arc<SpillBuffer>> {
+    fn decoded(&mut self, part: usize, first: usize, room: usize, spool: &mut Spool) -> Result<Arc<SpillBuffer>> {
         if let Some(last) = self.last.as_ref().filter(|last| (last.part, last.first) == (part, first)) {
             return Ok(last.data.clone());
         }
         self.last = None;
         let Part { path, frames, stored, at, .. } = &mut self.parts[part];
         let DataLocation::Decoded(decoder) = at else { unreachable!("only what is packed is decoded") };
+        let together = decoder.frames_per_chunk();
         let mut data = SpillBuffer::within(stored.bytes, room, spool, path)?;
         decoder.decode(path, first..(first + together).min(*frames), &mut data)?;
         let data = Arc::new(data);
@@ -298,7 +328,7 @@ impl FrameSource for Series {
         for part in parts.clone() {
             let wanted = self.wanted(part, (first..end).step_by(step));
             if !wanted.is_empty() {
-                self.add(part, &wanted, (&mut window, &mut spool))?;
+                self.add(part, &wanted, &mut window, &mut spool)?;
             }
         }
         self.close_files(parts.start..parts.end.saturating_sub(1).max(parts.start));
@@ -306,13 +336,11 @@ impl FrameSource for Series {
     }
 }
 
-/// Reads a header, and replaces its spacing and origin by those of the user.
-fn describe(path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
-    let mut file = formats::describe(path, options, extent)?;
-    let mut grid = file.grid();
-    override_grid(&mut grid, options);
-    (file.spacing, file.origin) = (grid.spacing, grid.origin);
-    Ok(file)
+/// A header with the spacing and origin of the user.
+fn on_grid_of_user(mut header: FileHeader, options: &OpenOptions) -> FileHeader {
+    header.spacing = options.spacing.unwrap_or(header.spacing);
+    header.origin = options.origin.unwrap_or(header.origin);
+    header
 }
 
 fn note_once(notes: &mut Vec<Note>, note: impl Into<Note>) {
@@ -323,13 +351,13 @@ fn note_once(notes: &mut Vec<Note>, note: impl Into<Note>) {
 }
 
 /// Replaces the spacing and origin by those of the user.
-pub(super) fn override_grid(grid: &mut Grid, options: &OpenOptions) {
+pub(crate) fn override_grid(grid: &mut Grid, options: &OpenOptions) {
     grid.spacing = options.spacing.unwrap_or(grid.spacing);
     grid.origin = options.origin.unwrap_or(grid.origin);
 }
 
 /// Refuses a grid that cannot be drawn.
-pub(super) fn check_grid(grid: &Grid, options: &OpenOptions, path: &Path) -> Result<()> {
+pub(crate) fn check_grid(grid: &Grid, options: &OpenOptions, path: &Path) -> Result<()> {
     if grid.spacing.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
         let what = format!("{:?} is not positive", grid.spacing);
         return Err(match options.spacing {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// A fixed number of bytes, zero at first.
 #[derive(Debug)]
-pub(super) enum SpillBuffer {
+pub(crate) enum SpillBuffer {
     Memory(Vec<u8>),
     /// In a temporary file, from a byte on.
     Spool {
@@ -22,7 +22,7 @@ pub(super) enum SpillBuffer {
 /// A temporary file without a name, created at first use. The frames of a window share it, since the number of open
 /// files is limited.
 #[derive(Debug, Default)]
-pub(super) struct Spool {
+pub(crate) struct Spool {
     file: Option<Arc<File>>,
     len: u64,
 }
@@ -44,12 +44,12 @@ impl Spool {
 impl SpillBuffer {
     /// Allocates `bytes`, in memory if at most `memory` are needed, else in a temporary file. Messages call the input
     /// `name`.
-    pub(super) fn new(bytes: usize, memory: usize, name: &Path) -> Result<Self> {
+    pub(crate) fn new(bytes: usize, memory: usize, name: &Path) -> Result<Self> {
         Self::within(bytes, memory, &mut Spool::default(), name)
     }
 
     /// As [`Self::new`], with a file that others share.
-    pub(super) fn within(bytes: usize, memory: usize, spool: &mut Spool, name: &Path) -> Result<Self> {
+    pub(crate) fn within(bytes: usize, memory: usize, spool: &mut Spool, name: &Path) -> Result<Self> {
         if bytes > memory {
             return spool.room(bytes).map_err(|e| Error::io(std::env::temp_dir(), "making a temporary file", e));
         }
@@ -61,12 +61,12 @@ impl SpillBuffer {
     }
 
     /// Bytes that it takes of memory.
-    pub(super) fn memory(&self) -> usize {
+    pub(crate) fn memory(&self) -> usize {
         if let Self::Memory(held) = self { held.len() } else { 0 }
     }
 
     /// Puts bytes in their place, which must be there.
-    pub(super) fn write_at(&mut self, at: u64, bytes: &[u8]) -> io::Result<()> {
+    pub(crate) fn write_at(&mut self, at: u64, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Memory(held) => held[at as usize..][..bytes.len()].copy_from_slice(bytes),
             Self::Spool { file, start, len } => file.write_all_at(bytes, place(*start, *len, at, bytes.len())?)?,
@@ -75,7 +75,7 @@ impl SpillBuffer {
     }
 
     /// Copies bytes out.
-    pub(super) fn read_at(&self, at: u64, out: &mut [u8]) -> io::Result<()> {
+    pub(crate) fn read_at(&self, at: u64, out: &mut [u8]) -> io::Result<()> {
         match self {
             Self::Memory(held) => wavesplat_format::Storage::read_at(held.as_slice(), at, out),
             Self::Spool { file, start, len } => file.read_exact_at(out, place(*start, *len, at, out.len())?),
@@ -90,7 +90,7 @@ fn place(start: u64, len: u64, at: u64, bytes: usize) -> io::Result<u64> {
 }
 
 /// Some bytes, or none at the end.
-pub(super) fn read_some(reader: &mut dyn Read, out: &mut [u8]) -> io::Result<usize> {
+pub(crate) fn read_some(reader: &mut dyn Read, out: &mut [u8]) -> io::Result<usize> {
     loop {
         match reader.read(out) {
             Err(e) if e.kind() == ErrorKind::Interrupted => {}

@@ -1,43 +1,21 @@
-//! What the tests of the formats share: samples with known values, files, and a slow read of boxes.
+//! What tests share: samples with known values, and a slow read of boxes.
 
-use super::{FrameSource, FrameWindow, OpenOptions, open};
+use super::{FrameSource, FrameWindow};
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
-use crate::base::mapped::Access;
 use crate::base::sample::{SampleType, load, store, swap_endian};
-use std::fs;
-use std::path::PathBuf;
 
 /// Voxels of the tests' frames: all different, none a power of two.
-pub(super) const DIMS: [usize; 3] = [7, 5, 3];
-
-/// A folder that vanishes with the test.
-pub(super) struct Folder(tempfile::TempDir);
-
-impl Folder {
-    pub(super) fn new() -> Self {
-        Self(tempfile::tempdir().expect("temporary folder"))
-    }
-
-    pub(super) fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    pub(super) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.path(name);
-        fs::write(&path, bytes).expect("writing");
-        path
-    }
-}
+pub(crate) const DIMS: [usize; 3] = [7, 5, 3];
 
 /// The value of a voxel of a frame: every type holds it, and no two of a frame are the same.
-pub(super) fn value(ty: SampleType, frame: usize, voxel: usize) -> f64 {
+pub(crate) fn value(ty: SampleType, frame: usize, voxel: usize) -> f64 {
     let value = (voxel + frame) as f64;
     if ty.is_float() { value / 4.0 - 3.0 } else { value }
 }
 
 /// The bytes of frames of `DIMS` one after another.
-pub(super) fn payload(ty: SampleType, frames: std::ops::Range<usize>, big_endian: bool) -> Vec<u8> {
+pub(crate) fn payload(ty: SampleType, frames: std::ops::Range<usize>, big_endian: bool) -> Vec<u8> {
     let voxels = DIMS.iter().product::<usize>();
     let values: Vec<f64> = frames.flat_map(|t| (0..voxels).map(move |i| value(ty, t, i))).collect();
     let mut bytes = vec![0; values.len() * ty.size()];
@@ -51,20 +29,20 @@ pub(super) fn payload(ty: SampleType, frames: std::ops::Range<usize>, big_endian
 /// Boxes of every kind: whole, whole rows, whole planes, single voxels, inner ones, empty.
 fn regions() -> Vec<Region> {
     let [x, y, z] = DIMS;
-    let of = |start, end| Region { start, end };
+    let region = |start, end| Region { start, end };
     vec![
-        of([0, 0, 0], DIMS),
-        of([0, 0, 1], [x, y, 2]),
-        of([0, 1, 0], [x, 3, z]),
-        of([1, 0, 0], [2, y, z]),
-        of([2, 1, 1], [6, 4, 3]),
-        of([x - 1, y - 1, z - 1], DIMS),
-        of([3, 3, 1], [3, 3, 1]),
+        region([0, 0, 0], DIMS),
+        region([0, 0, 1], [x, y, 2]),
+        region([0, 1, 0], [x, 3, z]),
+        region([1, 0, 0], [2, y, z]),
+        region([2, 1, 1], [6, 4, 3]),
+        region([x - 1, y - 1, z - 1], DIMS),
+        region([3, 3, 1], [3, 3, 1]),
     ]
 }
 
 /// Checks every box of every frame of a window that starts at frame `first`.
-pub(super) fn check_window(window: &dyn FrameWindow, ty: SampleType, first: usize) {
+pub(crate) fn check_window(window: &dyn FrameWindow, ty: SampleType, first: usize) {
     let whole = Grid::unit(DIMS).whole();
     for frame in 0..window.frames() {
         for region in regions() {
@@ -80,7 +58,7 @@ pub(super) fn check_window(window: &dyn FrameWindow, ty: SampleType, first: usiz
 }
 
 /// Checks a source of `frames` frames, window by window.
-pub(super) fn check_source(source: &mut dyn FrameSource, ty: SampleType, frames: usize) {
+pub(crate) fn check_source(source: &mut dyn FrameSource, ty: SampleType, frames: usize) {
     assert_eq!(source.archive().grid.dims, DIMS);
     assert_eq!(source.archive().sample, ty);
     for first in (0..frames).step_by(2) {
@@ -91,48 +69,10 @@ pub(super) fn check_source(source: &mut dyn FrameSource, ty: SampleType, frames:
     }
 }
 
-/// Checks that inputs hold `frames` frames of the tests' values, by map and by read.
-pub(super) fn check_inputs(inputs: &[PathBuf], options: &OpenOptions, ty: SampleType, frames: usize) {
-    for access in [Access::Map, Access::Read] {
-        let mut source = open(inputs, &OpenOptions { access, ..options.clone() }).expect("opening");
-        assert_eq!(source.archive().frames, Some(frames));
-        check_source(&mut *source, ty, frames);
-        assert!(source.window(frames, 1).is_err(), "beyond the end");
-        assert_eq!(source.window(frames, 0).expect("nothing").frames(), 0);
-    }
-}
-
 /// The message of an error that must come, and its remedy.
-pub(super) fn message<T>(result: Result<T>) -> String {
+pub(crate) fn message<T>(result: Result<T>) -> String {
     match result {
         Ok(_) => panic!("an error was expected"),
         Err(e) => e.remedy().map_or(e.to_string(), |remedy| format!("{e}; {remedy:?}")),
-    }
-}
-
-/// Checks that opening fails and that the message has these words.
-pub(super) fn refused(inputs: &[PathBuf], options: &OpenOptions, words: &str) {
-    let message = message(open(inputs, options));
-    assert!(message.contains(words), "{words:?} is not in {message:?}");
-}
-
-/// Opens and reads a file with every one of its bytes changed in turn: whatever it says, nothing may panic.
-pub(super) fn survives_damage(name: &str, good: &[u8]) {
-    survives_damage_in(0..good.len(), name, good);
-}
-
-/// As [`survives_damage`], of some of its bytes.
-pub(super) fn survives_damage_in(bytes: std::ops::Range<usize>, name: &str, good: &[u8]) {
-    let folder = Folder::new();
-    for (at, byte) in bytes.flat_map(|at| b"\0\xff9-<(% ".map(|byte| (at, byte))) {
-        let mut bad = good.to_vec();
-        bad[at] = byte;
-        let Ok(mut source) = open(&[folder.write(name, bad)], &OpenOptions::default()) else { continue };
-        let whole = source.archive().grid.whole();
-        let mut out = vec![0; whole.voxels() * source.archive().sample.size()];
-        let frames = source.archive().frames.expect("files have a known number of frames");
-        if let Ok(window) = source.window(0, frames) {
-            let _ = window.read_box(0, &whole, &mut out);
-        }
     }
 }

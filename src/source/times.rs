@@ -44,7 +44,7 @@ impl RegularTimes {
 
     /// The times of every `every`-th frame from `first` on.
     #[must_use]
-    pub fn of(self, first: usize, every: usize) -> Self {
+    pub fn stepped(self, first: usize, every: usize) -> Self {
         let first = first.saturating_mul(self.every).saturating_add(self.first);
         Self { first, every: every.saturating_mul(self.every), ..self }
     }
@@ -62,7 +62,7 @@ impl RegularTimes {
     }
 
     /// The times of frames.
-    pub(super) fn times(self, frames: Range<usize>) -> Vec<f64> {
+    pub(crate) fn times(self, frames: Range<usize>) -> Vec<f64> {
         frames.map(|frame| self.at(frame)).collect()
     }
 }
@@ -77,7 +77,7 @@ impl fmt::Display for RegularTimes {
 ///
 /// # Errors
 /// Why that cannot be: a sentence that follows the name of the file.
-pub(super) fn onto_clock(file: &mut FileHeader, first: &Units) -> std::result::Result<(), String> {
+pub(crate) fn onto_clock(file: &mut FileHeader, first: &Units) -> std::result::Result<(), String> {
     let converted = clock(&file.units).and_then(|own| own.convert(&mut file.times, clock(first)?));
     let refused =
         |why| format!("has times in {}, but the first file in {}: {why}", counted(&file.units), counted(first));
@@ -95,7 +95,7 @@ fn clock(units: &Units) -> std::result::Result<Clock, String> {
 }
 
 /// Puts the user's times in place of those of the files, and the files' onto the clock of an earlier archive.
-pub(super) fn settle(archive: &mut Archive, options: &OpenOptions) -> Result<()> {
+pub(crate) fn settle(archive: &mut Archive, options: &OpenOptions) -> Result<()> {
     if let Some(given) = &options.times {
         (archive.units.times, archive.units.calendar) = (None, None);
         match (given, archive.frames) {
@@ -189,7 +189,7 @@ mod tests {
     fn regular_times_of_some_frames_are_those_of_all() {
         let all = RegularTimes::new(0.5, 0.1).expect("a step");
         let times = all.times(0..100);
-        let some = all.of(3, 4).of(2, 5);
+        let some = all.stepped(3, 4).stepped(2, 5);
         assert_eq!(some.times(0..4), [11, 31, 51, 71].map(|frame| times[frame]));
         assert_eq!(some.after(some.at(3), 20).times(0..1), [times[91]]);
         assert_eq!(all.after(times[41], 1).times(0..50), times[42..92]);

@@ -34,7 +34,7 @@ pub struct VariableAxis {
 
 impl VariableInfo {
     /// One array of a volume with `dims` voxels along x, y, z.
-    pub(super) fn volume(name: &str, sample: &str, dims: [usize; 3], components: usize) -> Self {
+    pub(crate) fn volume(name: &str, sample: &str, dims: [usize; 3], components: usize) -> Self {
         let axis = |(name, length): (&str, usize)| VariableAxis { name: name.into(), length };
         let axes = ["z", "y", "x"].into_iter().zip([dims[2], dims[1], dims[0]]).map(axis).collect();
         Self { name: name.into(), sample: sample.into(), axes, components, steps: 1, unit: None }
@@ -64,7 +64,7 @@ impl Display for VariableInfo {
 }
 
 /// Variables for a message, each on a line of its own.
-pub(super) fn listed(all: &[VariableInfo]) -> String {
+pub(crate) fn listed(all: &[VariableInfo]) -> String {
     let mut text = String::new();
     for variable in all.iter().take(MOST_LISTED) {
         let _ = write!(text, "\n  {variable}");

@@ -130,7 +130,7 @@ fn write_frame(path: &Path, format: Format, shape: &Shape, bytes: &[u8]) -> io::
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use wavesplat::source::array_header;
+    use wavesplat::formats::array_header;
 
     const SHAPE: Shape = Shape { dims: [4, 3, 2], frames: 5, ty: SampleType::U16 };
 

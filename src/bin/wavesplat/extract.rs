@@ -9,7 +9,7 @@ use wavesplat::base::mapped::Access;
 use wavesplat::base::output::STANDARD;
 use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
 use wavesplat::extract::{
-    Contents, ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, extract_to,
+    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to,
 };
 use wavesplat::file::CoefficientFile;
 use wavesplat::source::CHANNELS;
@@ -98,7 +98,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
         order: SampleOrder::default(),
         memory: args.common.memory.0,
     };
-    let contents = Contents::new(&file, &config)?;
+    let contents = contents(&file, &config)?;
     config.order = format.order(&contents);
     check_memory(&file, &config)?;
     let files = Files::new(&args.output, format, &config.frames)?;
@@ -150,17 +150,16 @@ fn parse_channel(text: &str) -> std::result::Result<usize, String> {
 }
 
 fn parse_format(text: &str) -> std::result::Result<SampleFormat, String> {
-    let found = SampleFormat::NAMES.into_iter().find(|(name, _)| *name == text);
-    found
-        .map(|(_, format)| format)
-        .ok_or_else(|| format!("one of {}", SampleFormat::NAMES.map(|(name, _)| name).join(" ")))
+    let names = || SampleFormat::all().into_iter().map(SampleFormat::name).collect::<Vec<_>>().join(" ");
+    SampleFormat::named(text).ok_or_else(|| format!("one of {}", names()))
 }
 
 fn format_of(path: &Path) -> Result<SampleFormat> {
-    if path == Path::new(STANDARD) {
-        return Ok(SampleFormat::Npy);
-    }
-    let formats = SampleFormat::NAMES.map(|(name, _)| format!(".{name}")).join(" ");
-    let what = || format!("{}: the extension is none of {formats}; rename the file or give --format", path.display());
-    SampleFormat::of_ending(path).ok_or_else(|| Error::usage(what()))
+    let formats = || SampleFormat::all().into_iter().map(|format| format!(".{}", format.name())).collect::<Vec<_>>();
+    let what = || {
+        let (name, formats) = (path.display(), formats().join(" "));
+        format!("{name}: the extension is none of {formats}; rename the file or give --format")
+    };
+    let found = if path == Path::new(STANDARD) { SampleFormat::named("npy") } else { SampleFormat::of_ending(path) };
+    found.ok_or_else(|| Error::usage(what()))
 }

@@ -13,7 +13,8 @@ use wavesplat::convert::{
 use wavesplat::extract::{ExtractConfig, SampleOrder, extract};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
-use wavesplat::source::{FrameSource, OpenOptions, open_stream};
+use wavesplat::formats::open_stream;
+use wavesplat::source::{FrameSource, OpenOptions};
 
 /// Upper bound on the rounding of a sum or a product in the checks here.
 const UP: f64 = 1.0 + 1e-9;

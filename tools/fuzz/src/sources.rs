@@ -5,7 +5,8 @@ use std::io::Cursor;
 use std::path::Path;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::sample::{SampleType, swap_endian};
-use wavesplat::source::{FrameSource, OpenOptions, open, open_stream};
+use wavesplat::formats::{open, open_stream};
+use wavesplat::source::{FrameSource, OpenOptions};
 
 /// Largest frame in bytes that is read; larger ones are only opened.
 const MOST: usize = 1 << 20;

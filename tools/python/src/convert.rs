@@ -15,7 +15,8 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{ConvertRequest, run};
 use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::{self, IfUnfinished};
-use wavesplat::source::{self, FrameSource, GivenTimes, NamedArrays, OpenOptions};
+use wavesplat::formats::{self, NamedArrays};
+use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
 
 /// What is asked of a conversion, and where it goes.
 #[derive(FromPyObject)]
@@ -88,7 +89,7 @@ pub(crate) fn convert_frames(
     let request = conversion.request()?;
     let (dims, memory) = (Some(dims), request.memory / SHARE);
     let options = OpenOptions { dims, sample, spacing, origin, times, time_unit, memory, ..OpenOptions::default() };
-    let open = |caller| source::open_stream(FrameReader::new(iterator, caller), &options);
+    let open = |caller| formats::open_stream(FrameReader::new(iterator, caller), &options);
     conversion.run(py, &request, open, report.as_ref())
 }
 
@@ -121,7 +122,7 @@ pub(crate) fn convert_arrays(
     let options = OpenOptions { variable, axes, memory: request.memory / SHARE, ..OpenOptions::default() };
     let open = |caller| {
         let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
-        source::open_arrays(Path::new(&name), &arrays, &options)
+        formats::open_arrays(Path::new(&name), &arrays, &options)
     };
     conversion.run(py, &request, open, report.as_ref())
 }

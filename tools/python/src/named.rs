@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat::base::description::{Attribute, Dimension};
-use wavesplat::source::{ArrayType, NamedArray, NamedArrays};
+use wavesplat::formats::{ArrayType, NamedArray, NamedArrays};
 
 /// An array as Python describes it.
 #[derive(FromPyObject)]

@@ -14,8 +14,9 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::{ConvertConfig, convert};
 use wavesplat::file::CoefficientFile;
+use wavesplat::formats;
 use wavesplat::render::{CoefficientScene, FrameScene, Limit, RenderConfig, RenderReport, Scene, SplatSource, render};
-use wavesplat::source::{self, OpenOptions};
+use wavesplat::source::OpenOptions;
 use wavesplat::view::footprint::Kernel;
 
 /// The number of the layout of `layers.json`; a change of a key's meaning changes it.
@@ -126,7 +127,7 @@ impl ProcessTask for Task {
 
 /// Converts and renders in this process.
 fn measure(task: &Task) -> Result<Vec<Row>> {
-    let open = || source::open(std::slice::from_ref(&task.source), &OpenOptions::default());
+    let open = || formats::open(std::slice::from_ref(&task.source), &OpenOptions::default());
     let (truth, _) = pictures(&mut FrameScene::new(open()?, None), task, 0.0, None)?;
     let settings = ConvertConfig { range: Some(task.range), memory: MEMORY, ..ConvertConfig::new(FINE) };
     let mut bytes = Vec::new();

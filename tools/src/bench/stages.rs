@@ -16,8 +16,9 @@ use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
+use wavesplat::formats;
 use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, Scene, SplatSource};
-use wavesplat::source::{self, FrameSource, OpenOptions, Selection, select};
+use wavesplat::source::{FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
 
 /// Converts frames to a coefficient file.
@@ -119,7 +120,7 @@ pub(super) const MEMORY: usize = 512 << 20;
 
 /// The first `count` frames of an archive.
 pub(super) fn open_frames(path: &Path, count: usize) -> Result<Box<dyn FrameSource>> {
-    let source = source::open(&[path.into()], &OpenOptions::default())?;
+    let source = formats::open(&[path.into()], &OpenOptions::default())?;
     let region = source.archive().grid.whole();
     select(source, Selection { first: 0, step: 1, frames: Some(count), region })
 }

@@ -20,6 +20,7 @@ use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Basis, ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::{Comparison, verify};
+use wavesplat::formats;
 use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::view::camera::View;
@@ -141,7 +142,7 @@ pub fn write_frames(folder: &Path, plate: Plate, frames: usize) -> Result<()> {
 impl Demo {
     fn source(&self) -> Result<Box<dyn FrameSource>> {
         let spacing = Some([self.plate.spacing; 3]);
-        source::open(&[self.frames()], &OpenOptions { spacing, ..OpenOptions::default() })
+        formats::open(&[self.frames()], &OpenOptions { spacing, ..OpenOptions::default() })
     }
 
     /// All methods with three channels, which figure 5 shows, and with one.

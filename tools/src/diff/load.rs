@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::mapped::{Access, FileBytes};
 use wavesplat::base::sample::{self, SampleType};
-use wavesplat::source;
+use wavesplat::formats;
 
 const PNG_MAGIC: &[u8] = b"\x89PNG";
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
@@ -63,7 +63,7 @@ impl Stack {
     /// # Errors
     /// Files are absent, damaged or neither of these; arrays have other dimensions; PNGs differ from the first.
     pub(super) fn open(name: &Path) -> Result<Self> {
-        let paths = source::files(name, "png")?;
+        let paths = formats::files(name, "png")?;
         match &paths[..] {
             [only] if begins(only)?.starts_with(NPY_MAGIC) => Self::open_array(only),
             _ => Self::open_pngs(paths),
@@ -81,7 +81,7 @@ impl Stack {
     }
 
     fn open_array(path: &Path) -> Result<Self> {
-        let header = source::array_header(path)?;
+        let header = formats::array_header(path)?;
         let file = FileBytes::open(path, Access::Read)?; // truncating a mapped file would end the program
         let refused = |what: String| Error::input(path, what);
         let shape = array_shape(&header.lengths, header.sample).map_err(refused)?;

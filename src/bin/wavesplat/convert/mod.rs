@@ -16,8 +16,9 @@ use wavesplat::convert::{Bound, ConvertReport, Failure, run as convert};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::repack::{RepackReport, repack};
 use wavesplat::file::resume::{self, IfUnfinished};
+use wavesplat::formats::extensions;
 use wavesplat::picture::colours_of_source;
-use wavesplat::source::{FrameSource, extensions};
+use wavesplat::source::FrameSource;
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;

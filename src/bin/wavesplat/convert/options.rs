@@ -7,8 +7,8 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::cli::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
 use wavesplat::convert::shard::Shard;
 use wavesplat::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
+use wavesplat::formats::extensions;
 use wavesplat::picture::open_colours;
-use wavesplat::source::extensions;
 
 /// Convert frames to a coefficient file
 #[derive(Debug, Clone, Args)]

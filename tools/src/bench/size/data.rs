@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::sample::{self, SampleType};
-use wavesplat::source::{self, OpenOptions, read_frames};
+use wavesplat::formats;
+use wavesplat::source::{OpenOptions, read_frames};
 
 /// An archive that can be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -125,7 +126,7 @@ impl Data {
 
     /// Describes a file; reads every sample.
     pub(in crate::bench) fn of(path: PathBuf) -> Result<Self> {
-        let mut source = source::open(std::slice::from_ref(&path), &OpenOptions::default())?;
+        let mut source = formats::open(std::slice::from_ref(&path), &OpenOptions::default())?;
         let archive = source.archive().clone();
         let (whole, ty, frames) = (archive.grid.whole(), archive.sample, archive.frames.unwrap_or(0));
         let (mut range, mut values) = ((f64::INFINITY, f64::NEG_INFINITY), vec![0.0; whole.voxels()]);

@@ -15,10 +15,11 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::sample;
 use wavesplat::convert::{ConvertReport, convert};
 use wavesplat::file::CoefficientFile;
+use wavesplat::formats;
 use wavesplat::internal::Block;
 use wavesplat::internal::WindowCodec;
 use wavesplat::internal::difference_up;
-use wavesplat::source::{self, OpenOptions, read_frames};
+use wavesplat::source::{OpenOptions, read_frames};
 
 /// The settings of a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -90,7 +91,7 @@ fn measure(task: &Task) -> Result<Measured> {
 
 fn encode(task: &Task) -> Result<(ConvertReport, Vec<u8>)> {
     let config = schemes::config(&task.scheme, task.tolerance, task.range, MEMORY)?;
-    let mut frames = source::open(std::slice::from_ref(&task.source), &OpenOptions::default())?;
+    let mut frames = formats::open(std::slice::from_ref(&task.source), &OpenOptions::default())?;
     let mut bytes = Vec::new();
     let report = convert(frames.as_mut(), &config, &task.output, &mut bytes, &Silent)?;
     Ok((report, bytes))
@@ -167,7 +168,7 @@ fn put(block: &[u8], region: &Region, frame: &mut [u8], whole: &Region, size: us
 
 /// The largest error of any sample compared with the archive, rounded up; infinite if a value is lost.
 fn largest_error(source: &Path, samples: &[u8]) -> Result<f64> {
-    let mut archive = source::open(&[source.into()], &OpenOptions::default())?;
+    let mut archive = formats::open(&[source.into()], &OpenOptions::default())?;
     let (whole, ty) = (archive.archive().grid.whole(), archive.archive().sample);
     let frame_bytes = whole.voxels() * ty.size();
     let count = samples.len() / frame_bytes;

@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint, convert};
-use wavesplat::source::{self, OpenOptions};
+use wavesplat::formats;
+use wavesplat::source::OpenOptions;
 
 /// The settings of a conversion.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -63,7 +64,7 @@ pub(super) fn run(conversion: &Conversion) -> Result<Measured> {
     };
     let out = File::create(output).map_err(|e| Error::io(output, "creating", e))?;
     let (report, time) = Stopwatch::time(|| {
-        let mut frames = source::open(std::slice::from_ref(source), &OpenOptions::default())?;
+        let mut frames = formats::open(std::slice::from_ref(source), &OpenOptions::default())?;
         convert(frames.as_mut(), &config, output, BufWriter::new(out), &Silent)
     })?;
     let bytes = fs::metadata(output).map_err(|e| Error::io(output, "looking at", e))?.len();

@@ -13,8 +13,9 @@ use wavesplat::base::error::Result;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::progress::Silent;
 use wavesplat::file::CoefficientFile;
+use wavesplat::formats;
 use wavesplat::render::{CoefficientScene, FrameScene, Limit, RenderConfig, Scene, SplatSource, render};
-use wavesplat::source::{self, FrameSource, OpenOptions};
+use wavesplat::source::{FrameSource, OpenOptions};
 use wavesplat::view::camera::Camera;
 use wavesplat::view::footprint::Kernel;
 
@@ -126,7 +127,7 @@ struct Shown {
 
 impl Opened {
     fn new(view: &View) -> Result<Self> {
-        let frames = || source::open(std::slice::from_ref(&view.input), &OpenOptions::default());
+        let frames = || formats::open(std::slice::from_ref(&view.input), &OpenOptions::default());
         let file = |what| {
             let file = CoefficientFile::open(&view.input)?;
             Ok(Self::Library(Box::new(CoefficientScene::new(file, what))))

@@ -1,0 +1,140 @@
+//! One variable of a file of arrays as frames.
+
+use super::choose::{self, Choice};
+use super::chunks::Chunks;
+use super::opener::{OpenFile, Opener};
+use super::places::Places;
+use super::resolve::{Context, ResolvedArray};
+use super::sibling_times::StepArrays;
+use super::{ArrayFile, FileArrays, Variable, openpmd, vtkhdf};
+use crate::base::error::{Error, Note, Result};
+use crate::base::mapped::{Access, FileBytes, State};
+use crate::formats::numbering;
+use crate::source::file_header::FileHeader;
+use crate::source::parts::Part;
+use crate::source::{Advised, Extent, OpenOptions, Parsed};
+use std::path::{Path, PathBuf};
+
+/// A file of arrays that was opened to see what it holds.
+pub(crate) struct ArrayArchive {
+    format: &'static str,
+    opener: Opener,
+    file: Box<dyn ArrayFile>,
+    /// The file whose state shows whether the archive was changed; `None` if the caller holds the arrays.
+    watched: Option<PathBuf>,
+}
+
+impl ArrayArchive {
+    /// Opens a file by `open`. The state of the file `watched` shows whether the archive was changed.
+    pub(crate) fn open(
+        format: &'static str,
+        path: &Path,
+        watched: Option<&Path>,
+        open: OpenFile,
+        options: &OpenOptions,
+    ) -> Result<Self> {
+        let opener = Opener::new(path, open, options);
+        Ok(Self { format, file: opener.open()?, opener, watched: watched.map(Path::to_path_buf) })
+    }
+
+    /// Whether the NetCDF library wrote it.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn is_of_netcdf(&self) -> bool {
+        self.file.group("/").contains_key("_NCProperties")
+    }
+
+    /// The state of the file that is watched.
+    fn state(&self) -> Result<State> {
+        self.watched.as_ref().map_or(Ok(State::HELD), |path| Ok(FileBytes::open(path, Access::Read)?.state()))
+    }
+
+    /// All arrays, or those of an image in VTKHDF.
+    fn variables(&self) -> Parsed<(Vec<Variable>, Option<vtkhdf::Image>)> {
+        let all = self.file.variables()?;
+        let image = vtkhdf::Image::read(self.file.as_ref(), &all)?;
+        Ok((image.as_ref().map_or(all, |image| image.variables.clone()), image))
+    }
+
+    /// The variables among which the user must choose; none if it is clear which one is meant.
+    pub(crate) fn undecided(&self) -> Result<Vec<crate::source::VariableInfo>> {
+        let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
+        Ok(choose::undecided(&all, active(image.as_ref())))
+    }
+
+    /// Describes the frames of the chosen variable.
+    pub(crate) fn describe(&self, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
+        let (path, state) = (self.opener.path.as_path(), self.state()?);
+        let refused = |e| Error::input(path, e);
+        let (all, image) = self.variables().map_err(refused)?;
+        let (choice, index) = match options.variable.as_deref() {
+            Some(name) => choose::named(&all, name).map_err(Note::from),
+            None => choose::only(&all, active(image.as_ref())).map(|choice| (choice, None)),
+        }
+        .map_err(|e| Error::input(path, e))?;
+        if !options.allow_gaps {
+            numbering::check_steps(path, &choice.path, "step", &choice.steps)?;
+        }
+        let (axes, spaced) = (options.axes.as_deref(), options.spacing.is_some());
+        let (arrays, format) = (FileArrays { file: self.file.as_ref(), all: &all }, self.format);
+        let context = Context { format, arrays, image, index, axes, spaced, extent };
+        let found = choice.arrays.iter().map(|array| context.resolve(array)).collect::<Advised<Vec<_>>>();
+        let found = found.map_err(|e| Error::input(path, e))?;
+        let mut parts = Vec::new();
+        for found in &found {
+            parts.push(self.part(found, state)?);
+        }
+        let mut described = joined(found, parts).map_err(refused)?;
+        if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice) {
+            (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+        }
+        if choice.arrays.len() > 1 {
+            take_times(&mut described, arrays, &choice);
+            described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
+        }
+        Ok(described)
+    }
+
+    /// The frames of an array: where they are, or how to decode them.
+    fn part(&self, found: &ResolvedArray, state: State) -> Result<Part> {
+        let refused = |e| Error::input(&self.opener.path, e);
+        let path = self.watched.as_ref().unwrap_or(&self.opener.path);
+        if let Some(place) = self.file.in_place(&found.variable.path).filter(|_| found.order.is_empty()) {
+            return found.in_place(path, state, place).map_err(refused);
+        }
+        let chunks = Chunks::new(&found.variable, &found.axes, found.order.clone(), &self.opener)?;
+        found.decoded(path, state, chunks).map_err(refused)
+    }
+}
+
+/// Takes the times beside arrays for the steps, if these have none.
+fn take_times(described: &mut FileHeader, arrays: FileArrays<'_>, choice: &Choice<'_>) {
+    let count = choice.arrays.len();
+    if described.times.len() == count {
+        return;
+    }
+    let mut places = Places::default();
+    places.take_sibling_times(arrays, &StepArrays { group: choice.group(), axis: "", count });
+    if places.times.len() == count {
+        (described.times, described.units.times) = (places.times, places.time_unit);
+        described.units.calendar = places.calendar;
+    }
+    described.notes.extend(places.notes);
+}
+
+/// The name of the active array of an image.
+fn active(image: Option<&vtkhdf::Image>) -> Option<&str> {
+    image.and_then(|image| image.active.as_deref())
+}
+
+/// One archive of the arrays of all steps.
+fn joined(mut found: Vec<ResolvedArray>, parts: Vec<Part>) -> Parsed<FileHeader> {
+    let first = found.swap_remove(0);
+    if let Some(other) = found.iter().find(|other| other.layout.dims() != first.layout.dims()) {
+        let (a, b) = (&first.variable, &other.variable);
+        return Err(format!("{} has {:?} samples, but {} has {:?}", b.path, b.lengths, a.path, a.lengths));
+    }
+    if let Some(other) = found.iter().find(|other| other.values.sample != first.values.sample) {
+        return Err(format!("{} and {} have samples of different types", first.variable.path, other.variable.path));
+    }
+    first.described(parts)
+}

@@ -1,0 +1,203 @@
+//! What a file of arrays says beside the samples: dimensions, attributes, coordinates and other small arrays.
+
+use super::{ArrayFile, Variable};
+use crate::base::description::{
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, Values, Variable as Described, frames_of, select,
+};
+use crate::source::layout::Axis;
+use crate::source::{Extent, Parsed};
+
+/// Bytes of an array that is kept whole.
+const MOST_BYTES: usize = 8 << 20;
+
+/// Bytes of all of them: less than a description may have, since it also has texts.
+const MOST_BYTES_TOGETHER: usize = 14 << 20;
+
+/// Values of an array for each frame that are kept.
+const MOST_PER_FRAME: usize = 64;
+
+/// Attributes that describe how samples are stored. They are not kept, because samples are decoded by them.
+const STORAGE: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "_Unsigned"];
+
+/// Attributes with stored numbers, which are others than the samples of packed arrays.
+const PACKED: [&str; 4] = ["valid_min", "valid_max", "valid_range", "missing_value"];
+
+/// The samples' array, and what is known of it.
+pub(crate) struct Samples<'a> {
+    pub(crate) variable: &'a Variable,
+    pub(crate) axes: &'a [Axis],
+    /// The variable with the times of the frames.
+    pub(crate) times: Option<&'a str>,
+    /// Whether the stored numbers are not the samples.
+    pub(crate) packed: bool,
+    /// What to read.
+    pub(crate) extent: Extent,
+}
+
+/// The description, and the names of arrays that were left out because they are large.
+pub(crate) fn description(
+    source: &str,
+    file: &dyn ArrayFile,
+    all: &[Variable],
+    samples: &Samples<'_>,
+) -> (Description, Vec<String>) {
+    let mut builder = Builder { file, samples, found: Description { source: source.into(), ..Description::default() } };
+    builder.add_axes();
+    builder.found.attributes = builder.attributes();
+    builder.found.global = file.described("").into_iter().filter(is_users).collect();
+    let left_out = builder.add_variables(all);
+    (builder.found, left_out)
+}
+
+struct Builder<'a> {
+    file: &'a dyn ArrayFile,
+    samples: &'a Samples<'a>,
+    found: Description,
+}
+
+impl Builder<'_> {
+    fn add_axes(&mut self) {
+        let Samples { variable, axes, .. } = self.samples;
+        for (&Axis { role, len, backwards, .. }, name) in axes.iter().zip(&variable.dims) {
+            if role == AxisRole::Single && len > 1 {
+                continue;
+            }
+            // axes without names get dimensions of their own, even if their lengths are equal
+            let dimension = self.new_dimension(name, len);
+            self.found.axes.push(ArrayAxis { dimension, role, reversed: backwards });
+        }
+    }
+
+    fn new_dimension(&mut self, name: &str, length: usize) -> u32 {
+        let unlimited = self.file.is_unlimited(name);
+        self.found.dimensions.push(Dimension { name: name.into(), length: length as u64, unlimited });
+        (self.found.dimensions.len() - 1) as u32
+    }
+
+    /// The dimension with this name and length.
+    fn dimension(&mut self, name: &str, length: usize) -> u32 {
+        let is_it = |dimension: &Dimension| dimension.name == name && dimension.length == length as u64;
+        match self.found.dimensions.iter().position(is_it) {
+            Some(at) => at as u32,
+            None => self.new_dimension(name, length),
+        }
+    }
+
+    /// The attributes of the samples, without those of their storage.
+    fn attributes(&self) -> Vec<Attribute> {
+        let Samples { variable, packed, .. } = self.samples;
+        let is_kept = |attribute: &Attribute| {
+            let name = attribute.name.as_str();
+            let is_packed = *packed && PACKED.contains(&name);
+            is_users(attribute) && !STORAGE.contains(&name) && !is_packed
+        };
+        self.file.described(&variable.path).into_iter().filter(is_kept).collect()
+    }
+
+    /// Adds the arrays that are small; returns the names of coordinates that are not.
+    fn add_variables(&mut self, all: &[Variable]) -> Vec<String> {
+        let (mut bytes, mut left_out) = (0, Vec::new());
+        let mut near: Vec<&Variable> = all.iter().filter(|other| self.belongs(other)).collect();
+        near.sort_by_key(|variable| count(variable)); // so that the largest are left out
+        for variable in near {
+            let Ok(values) = self.values(variable) else { continue };
+            let size = held_bytes(&values);
+            if size > MOST_BYTES || bytes + size > MOST_BYTES_TOGETHER {
+                left_out.push(variable.name().to_string());
+                continue;
+            }
+            bytes += size;
+            self.add(variable, values);
+        }
+        left_out
+    }
+
+    /// Whether an array is no field of its own, and is in the samples' group or in one around it.
+    fn belongs(&self, other: &Variable) -> bool {
+        let Samples { variable, axes, times, extent, .. } = self.samples;
+        let group = |variable: &Variable| variable.path[..variable.path.len() - variable.name().len()].to_string();
+        let along = |wanted: fn(AxisRole) -> bool| {
+            let named = variable.dims.iter().zip(*axes).filter(|(_, axis)| wanted(axis.role));
+            let names: Vec<&String> = named.map(|(name, _)| name).collect();
+            other.dims.iter().filter(|dim| names.contains(dim)).count()
+        };
+        let voxels = along(|role| role.voxels().is_some());
+        let along_time = along(|role| role == AxisRole::Frames) > 0;
+        let frames = axes.iter().find(|axis| axis.role == AxisRole::Frames).map_or(1, |axis| axis.len);
+        let is_small = match along_time {
+            true => voxels == 0 && count(other) <= MOST_PER_FRAME.saturating_mul(frames),
+            false => voxels < 3 && count(other).saturating_mul(size_of::<f64>()) <= 2 * MOST_BYTES,
+        };
+        let is_named = other.dims.iter().zip(&other.lengths).all(|(dim, length)| !dim.is_empty() || *length == 1);
+        if *times == Some(other.path.as_str()) {
+            return true;
+        }
+        let is_read = *extent == Extent::Whole || along_time;
+        other.path != variable.path && group(variable).starts_with(&group(other)) && is_named && is_small && is_read
+    }
+
+    /// The values of an array. Along an axis with a chosen index, only the values at that index.
+    fn values(&self, variable: &Variable) -> Parsed<Values> {
+        let Samples { times, .. } = self.samples;
+        if *times == Some(variable.path.as_str()) {
+            return Ok(Values::Times(self.file.number_type(&variable.path)?));
+        }
+        let values = self.file.values(&variable.path)?;
+        let kept: Vec<Option<Vec<usize>>> =
+            variable.dims.iter().map(|dim| self.chosen(dim).map(|index| vec![index])).collect();
+        if kept.iter().all(Option::is_none) { Ok(values) } else { Ok(select(&values, &variable.lengths, &kept)) }
+    }
+
+    /// The chosen index along a dimension of several that is not an axis of frames or voxels.
+    fn chosen(&self, dim: &str) -> Option<usize> {
+        let Samples { variable, axes, .. } = self.samples;
+        let axis = axes[variable.dims.iter().position(|other| other == dim && !dim.is_empty())?];
+        (axis.role == AxisRole::Single && axis.len > 1).then_some(axis.index)
+    }
+
+    fn add(&mut self, variable: &Variable, values: Values) {
+        let kept: Vec<(String, usize)> = variable.dims.iter().cloned().zip(variable.lengths.iter().copied()).collect();
+        let kept = kept.into_iter().filter(|(dim, _)| self.chosen(dim).is_none() && !dim.is_empty());
+        let dimensions = kept.collect::<Vec<_>>().iter().map(|(dim, length)| self.dimension(dim, *length)).collect();
+        let dimensions: Vec<u32> = match values {
+            Values::Times(_) => frames_of(&self.found).into_iter().collect(), // whatever their own axis is called
+            _ => dimensions,
+        };
+        let attributes = self.file.described(&variable.path).into_iter().filter(is_users).collect();
+        self.found.variables.push(Described { name: variable.name().into(), dimensions, values, attributes });
+    }
+}
+
+/// How many values an array has.
+fn count(variable: &Variable) -> usize {
+    variable.lengths.iter().fold(1, |count: usize, length| count.saturating_mul(*length))
+}
+
+fn held_bytes(values: &Values) -> usize {
+    match values {
+        Values::Texts(texts) => texts.iter().map(|text| text.len() + size_of::<u64>()).sum(),
+        Values::Numbers(numbers) => numbers.count() * numbers.ty.size(),
+        Values::Times(_) => 0,
+    }
+}
+
+/// Whether an attribute is the user's, and not one that the NetCDF and HDF5 libraries write for their own use.
+fn is_users(attribute: &Attribute) -> bool {
+    const INTERNAL: [&str; 8] = [
+        "CLASS",
+        "NAME",
+        "REFERENCE_LIST",
+        "DIMENSION_LIST",
+        "DIMENSION_LABELS",
+        "_NCProperties",
+        "_nc3_strict",
+        "_ARRAY_DIMENSIONS",
+    ];
+    !INTERNAL.contains(&attribute.name.as_str()) && !attribute.name.starts_with("_Netcdf4")
+}
+
+/// Numbers as values.
+#[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
+pub(crate) fn numbers(ty: crate::base::description::NumberType, bytes: &[u8]) -> Values {
+    Values::Numbers(crate::base::description::Numbers::new(ty, bytes))
+}

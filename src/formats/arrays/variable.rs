@@ -1,0 +1,89 @@
+//! An array of a file, and its attributes.
+
+use crate::base::description::{self, Values};
+use crate::base::stored::StoredType;
+use crate::source::Parsed;
+use std::collections::BTreeMap;
+
+/// An array and its attributes.
+#[derive(Debug, Clone)]
+pub(crate) struct Variable {
+    /// Its name, with those of the groups that it is in.
+    pub(crate) path: String,
+    /// The type of its numbers, or the name of one that is not supported.
+    pub(crate) sample: Parsed<StoredType>,
+    /// The slowest axis first.
+    pub(crate) lengths: Vec<usize>,
+    /// Name of each axis; empty where it has none.
+    pub(crate) dims: Vec<String>,
+    /// Chunk lengths, if it is stored in chunks.
+    pub(crate) chunk: Option<Vec<usize>>,
+    pub(crate) attributes: Attributes,
+}
+
+pub(crate) type Attributes = BTreeMap<String, Attribute>;
+
+/// The value of an attribute.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Attribute {
+    Text(String),
+    Texts(Vec<String>),
+    Numbers(Vec<f64>),
+}
+
+/// The numbers of an attribute; empty if it has none.
+pub(crate) fn numbers<'a>(attributes: &'a Attributes, name: &str) -> &'a [f64] {
+    match attributes.get(name) {
+        Some(Attribute::Numbers(numbers)) => numbers,
+        _ => &[],
+    }
+}
+
+/// The values of attributes that are texts or numbers.
+pub(crate) fn attributes(all: &[description::Attribute]) -> Attributes {
+    let value = |values: &Values| match values {
+        Values::Texts(texts) => match texts.as_slice() {
+            [text] => Some(Attribute::Text(text.clone())),
+            texts => Some(Attribute::Texts(texts.to_vec())),
+        },
+        Values::Numbers(numbers) => Some(Attribute::Numbers(numbers.to_f64())),
+        Values::Times(_) => None,
+    };
+    all.iter().filter_map(|a| Some((a.name.clone(), value(&a.value)?))).collect()
+}
+
+impl Variable {
+    pub(crate) fn text(&self, attribute: &str) -> Option<&str> {
+        match self.attributes.get(attribute)? {
+            Attribute::Text(text) => Some(text.trim()),
+            Attribute::Texts(_) | Attribute::Numbers(_) => None,
+        }
+    }
+
+    pub(crate) fn numbers(&self, attribute: &str) -> &[f64] {
+        numbers(&self.attributes, attribute)
+    }
+
+    pub(crate) fn number(&self, attribute: &str) -> Option<f64> {
+        self.numbers(attribute).first().copied()
+    }
+
+    /// Its path, as users name it.
+    pub(crate) fn shown(&self) -> &str {
+        self.path.trim_start_matches('/')
+    }
+
+    /// The last part of its path.
+    pub(crate) fn name(&self) -> &str {
+        self.path.rsplit('/').next().unwrap_or_default()
+    }
+
+    /// The variable that says where the voxels or frames of an axis are: it has the axis' name, and this one only.
+    pub(crate) fn coordinate<'a>(&self, axis: usize, all: &'a [Self]) -> Option<&'a Self> {
+        let dim = self.dims[axis].as_str();
+        let folder = &self.path[..self.path.len() - self.name().len()];
+        let is = |v: &&Self| !dim.is_empty() && v.name() == dim && v.lengths == [self.lengths[axis]];
+        let near = |v: &&Self| is(v) && v.path.strip_suffix(dim) == Some(folder);
+        all.iter().find(near).or_else(|| all.iter().find(is))
+    }
+}

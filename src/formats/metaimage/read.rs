@@ -1,0 +1,175 @@
+//! Reads MetaImage.
+
+use super::data;
+use super::header::MetaImageHeader;
+use super::layout::{BIG_ENDIAN, NAME, ORIGIN, SPACING, TRANSFORM, TYPES};
+use crate::base::description::{Attribute, AxisRole, Description, LPS, Values};
+use crate::base::error::{Error, Note, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::stored::StoredType;
+use crate::formats::shared::component;
+use crate::formats::shared::directions::{Directions, Placed};
+use crate::formats::shared::words::numbers;
+use crate::source::file_header::{FileHeader, growing_head};
+use crate::source::layout::Shape;
+use crate::source::layout::{Axis, Layout};
+use crate::source::parts::Stored;
+use crate::source::{Advised, Parsed};
+use std::path::Path;
+
+/// Reads the header and checks the size of every data file.
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
+    let refused = |e| Error::input(path, e);
+    let file = FileBytes::open(path, Access::Read)?;
+    let header = growing_head(&file, MetaImageHeader::parse)?;
+    let samples = samples(&header, variable).map_err(|e| Error::input(path, e))?;
+    let parts = data::parts(&file, &header, &samples)?;
+    let times = times(&header, &samples).map_err(refused)?;
+    let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
+    let description = description(&header, &samples).map_err(refused)?;
+    let MetaImageSamples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
+    let notes = note.into_iter().chain(unheeded).collect();
+    Ok(FileHeader { spacing, origin, times, variable, notes, description, ..FileHeader::plain(shape, parts) })
+}
+
+/// The directions of the axes and the other fields of the header; `None` if the axes are plain and there are no other
+/// fields.
+fn description(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<Option<Description>> {
+    let axes = [Axis::new(AxisRole::Frames, samples.frames)].into_iter().filter(|_| samples.axes == 4);
+    let layout = Layout(axes.chain(samples.placed.voxels(samples.lengths)).collect());
+    let text = |(name, value): (&str, &str)| Attribute { name: name.into(), value: Values::text(value) };
+    let global: Vec<Attribute> = header.others().map(text).collect();
+    let is_plain = global.is_empty() && samples.placed.is_plain();
+    let described = directions(header, samples.axes)?.description(NAME, LPS, &layout);
+    Ok((!is_plain).then_some(Description { global, ..described }))
+}
+
+/// What the samples are, wherever they are.
+pub(super) struct MetaImageSamples {
+    pub(super) axes: usize,
+    /// Voxels along its axes of space, the fastest first, as they are stored.
+    pub(super) lengths: [usize; 3],
+    pub(super) placed: Placed,
+    /// As they are when turned.
+    pub(super) shape: Shape,
+    /// The type of the stored numbers.
+    pub(super) ty: StoredType,
+    pub(super) frames: usize,
+    pub(super) components: usize,
+    /// Which of them is meant.
+    pub(super) component: usize,
+    pub(super) variable: Option<String>,
+    pub(super) big_endian: bool,
+    pub(super) compressed: bool,
+}
+
+impl MetaImageSamples {
+    /// How some frames are stored.
+    pub(super) fn stored(&self, frames: usize) -> Parsed<Stored> {
+        let components = Axis::single(self.component, self.components);
+        let voxels = self.placed.voxels(self.lengths);
+        let axes = [Axis::new(AxisRole::Frames, frames)].into_iter().chain(voxels).chain([components]);
+        Stored::new(&Layout(axes.collect()), self.ty, self.big_endian)
+    }
+
+    /// Some planes as if components were voxels beside one another.
+    pub(super) fn flat(&self, planes: usize) -> Parsed<Shape> {
+        let [x, y, _] = self.lengths;
+        let row = x.checked_mul(self.components).ok_or("a row of its size is too large")?;
+        Shape::new([row, y, planes], self.shape.sample())
+    }
+}
+
+fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImageSamples> {
+    if header.flag(&["binarydata"])? == Some(false) {
+        return Err("has its samples as text (BinaryData = False), which is not supported; write them as binary".into());
+    }
+    let axes = header.required("NDims")?.parse().map_err(|_| "NDims is no number")?;
+    if axes != 3 && axes != 4 {
+        return Err(format!("has {axes} dimension(s); supported are 3 (x y z) and 4 (x y z t)").into());
+    }
+    let sizes: Vec<usize> = numbers(header.required("DimSize")?, "DimSize", axes)?;
+    let (lengths, frames) = ([sizes[0], sizes[1], sizes[2]], sizes.get(3).copied().unwrap_or(1));
+    if frames == 0 {
+        return Err("has 0 frames".into());
+    }
+    let placed = directions(header, axes)?.placed(lengths, "directions of the MetaImage");
+    let dims = Layout(placed.voxels(lengths).to_vec()).dims();
+    let ty = stored_type(header.required("ElementType")?)?;
+    let shape = Shape::new(dims, ty.sample())?;
+    let components = header.get("elementnumberofchannels").unwrap_or("1");
+    let components = components.parse().map_err(|_| format!("ElementNumberOfChannels {components:?} is no number"))?;
+    let (component, variable) = component::only_array(None, components, variable)?;
+    let big_endian = header.flag(&BIG_ENDIAN)?.unwrap_or(false);
+    let compressed = header.flag(&["compresseddata"])?.unwrap_or(false);
+    let samples = MetaImageSamples {
+        axes,
+        lengths,
+        placed,
+        shape,
+        ty,
+        frames,
+        components,
+        component,
+        variable,
+        big_endian,
+        compressed,
+    };
+    samples.stored(frames)?; // so that all sizes that follow are small enough
+    Ok(samples)
+}
+
+fn stored_type(name: &str) -> Parsed<StoredType> {
+    TYPES.stored(name.strip_suffix("_ARRAY").unwrap_or(name)).ok_or_else(|| {
+        let types = "MET_CHAR to MET_ULONG_LONG, MET_FLOAT and MET_DOUBLE are";
+        format!("ElementType {name} is not supported; {types}")
+    })
+}
+
+/// Where voxels are in the world.
+fn directions(header: &MetaImageHeader, axes: usize) -> Parsed<Directions> {
+    let matrix = matrix(header, axes)?;
+    let rows = std::array::from_fn(|row| std::array::from_fn(|axis| matrix[row][axis]));
+    let along_space = |all: Vec<f64>| std::array::from_fn(|axis| all[axis]);
+    let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
+    Directions::new(rows, along_space(spacing), along_space(origin))
+}
+
+/// The direction of each axis.
+fn matrix(header: &MetaImageHeader, axes: usize) -> Parsed<Vec<Vec<f64>>> {
+    let unit = |axis| (0..axes).map(|a| if a == axis { 1.0 } else { 0.0 }).collect();
+    let Some(text) = header.any(&TRANSFORM) else { return Ok((0..axes).map(unit).collect()) };
+    Ok(numbers(text, "TransformMatrix", axes * axes)?.chunks(axes).map(<[f64]>::to_vec).collect())
+}
+
+/// Times where a fourth axis has a spacing.
+fn times(header: &MetaImageHeader, &MetaImageSamples { axes, frames, .. }: &MetaImageSamples) -> Parsed<Vec<f64>> {
+    let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
+    Ok(match (spacing.get(3), header.any(&SPACING)) {
+        (Some(step), Some(_)) if step.is_finite() => (0..frames).map(|t| origin[3] + step * t as f64).collect(),
+        _ => Vec::new(),
+    })
+}
+
+/// A number for each axis, by the first of some fields that is there.
+fn per_axis(header: &MetaImageHeader, names: &[&str], default: f64, axes: usize) -> Parsed<Vec<f64>> {
+    header.any(names).map_or_else(|| Ok(vec![default; axes]), |text| numbers(text, names[0], axes))
+}
+
+/// Notes on fields of the header that are ignored.
+fn unheeded(header: &MetaImageHeader, axes: usize) -> Parsed<Vec<Note>> {
+    let mut notes = Vec::new();
+    let matrix = matrix(header, axes)?;
+    let of_time = |a: usize| [matrix[3][a], matrix[a][3]];
+    if axes == 4 && (0..4).any(|a| of_time(a) != [if a == 3 { 1.0 } else { 0.0 }; 2]) {
+        notes
+            .push("the TransformMatrix of the MetaImage mixes time with space: its part of space is kept alone".into());
+    }
+    let scaled = |(name, value): (&str, f64)| header.get(name).is_some_and(|text| text.parse() != Ok(value));
+    if [("elementtointensityfunctionslope", 1.0), ("elementtointensityfunctionoffset", 0.0)].into_iter().any(scaled) {
+        notes.push(
+            "the ElementToIntensityFunction of the MetaImage is not applied: samples are as they are stored".into(),
+        );
+    }
+    Ok(notes)
+}

@@ -1,0 +1,109 @@
+//! Reads NRRD.
+
+use super::axes::Axes;
+use super::data;
+use super::header::NrrdHeader;
+use super::layout::{NAME, TYPES};
+use crate::base::description::{Attribute, AxisRole, Description, Values};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::stored::StoredType;
+use crate::formats::shared::component;
+use crate::formats::shared::directions::Placed;
+use crate::source::file_header::{FileHeader, growing_head};
+use crate::source::layout::Shape;
+use crate::source::layout::{Axis, Layout};
+use crate::source::{Advised, Parsed};
+use std::path::Path;
+
+/// Reads the header and checks the size of every data file that is not compressed.
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
+    let refused = |e| Error::input(path, e);
+    let file = FileBytes::open(path, Access::Read)?;
+    let header = growing_head(&file, NrrdHeader::parse)?;
+    let array = NrrdSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
+    let parts = data::parts(&file, &header, &array)?;
+    let description = description(&header, &array).map_err(refused)?;
+    let times = array.axes.times(&header).map_err(refused)?;
+    let units = array.axes.units(&header);
+    let NrrdSamples { shape, placed, variable, .. } = array;
+    let Placed { spacing, origin, note, .. } = placed;
+    let notes = note.into_iter().collect();
+    Ok(FileHeader { spacing, origin, times, units, variable, notes, description, ..FileHeader::plain(shape, parts) })
+}
+
+/// The directions of the axes, and the keys and values of users; none if axes ascend along those of an unnamed world.
+fn description(header: &NrrdHeader, array: &NrrdSamples) -> Parsed<Option<Description>> {
+    let space = header.get("space").unwrap_or_default();
+    let is_plain = space.is_empty() && header.keys.is_empty() && array.placed.is_plain();
+    let text = |(name, value): &(String, String)| Attribute { name: name.clone(), value: Values::text(value) };
+    let described = array.axes.placed(header)?.description(NAME, space, &array.layout);
+    Ok((!is_plain).then(|| Description { global: header.keys.iter().map(text).collect(), ..described }))
+}
+
+/// The samples that are meant.
+pub(super) struct NrrdSamples {
+    pub(super) axes: Axes,
+    pub(super) layout: Layout,
+    pub(super) shape: Shape,
+    /// The type of the stored numbers.
+    pub(super) ty: StoredType,
+    pub(super) big_endian: bool,
+    pub(super) gzip: bool,
+    pub(super) placed: Placed,
+    pub(super) variable: Option<String>,
+}
+
+impl NrrdSamples {
+    fn new(header: &NrrdHeader, variable: Option<&str>) -> Advised<Self> {
+        let gzip = is_gzip(header.required("encoding")?)?;
+        let axes = Axes::parse(header)?;
+        if axes.len(axes.frames) == 0 {
+            return Err("has 0 frames".into());
+        }
+        if axes.len(axes.components) == 0 {
+            return Err("has 0 components".into());
+        }
+        let (index, variable) = component::only_array(None, axes.len(axes.components), variable)?;
+        let placed =
+            axes.placed(header)?.placed(axes.voxels.map(|axis| axes.sizes[axis]), "space directions of the NRRD");
+        let layout = layout(&axes, &placed, index);
+        let ty = stored_type(header.required("type")?)?;
+        let shape = Shape::new(layout.dims(), ty.sample())?;
+        layout.bytes(ty.size())?;
+        Ok(Self { layout, shape, ty, big_endian: big_endian(header, ty)?, gzip, axes, placed, variable })
+    }
+}
+
+fn is_gzip(encoding: &str) -> Parsed<bool> {
+    match encoding.to_lowercase().as_str() {
+        "raw" => Ok(false),
+        "gzip" | "gz" => Ok(true),
+        other => Err(format!("encoding {other} is not supported; only raw and gzip are")),
+    }
+}
+
+fn layout(axes: &Axes, placed: &Placed, component: usize) -> Layout {
+    let axis = |(axis, len): (usize, &usize)| match axes.voxels.iter().position(|of| *of == axis) {
+        Some(of) => Axis { backwards: placed.axes[of].1, ..Axis::new(AxisRole::of_voxels(placed.axes[of].0), *len) },
+        None if axes.frames == Some(axis) => Axis::new(AxisRole::Frames, *len),
+        None => Axis::single(component, *len),
+    };
+    Layout(axes.sizes.iter().enumerate().map(axis).rev().collect())
+}
+
+fn big_endian(header: &NrrdHeader, ty: StoredType) -> Parsed<bool> {
+    match header.get("endian").map(str::to_lowercase).as_deref() {
+        Some("big") => Ok(true),
+        Some("little") => Ok(false),
+        None if ty.size() == 1 => Ok(false),
+        None => Err("does not say its endian".into()),
+        Some(other) => Err(format!("endian {other:?} is not known")),
+    }
+}
+
+fn stored_type(name: &str) -> Parsed<StoredType> {
+    let plain = name.to_lowercase().split_whitespace().collect::<Vec<_>>().join(" ");
+    let unsupported = || format!("type {name} is not supported; integers, float and double are");
+    TYPES.stored(plain.as_str()).ok_or_else(unsupported)
+}

@@ -1,0 +1,294 @@
+//! Expands the inputs of the user to a list of files in the order of time.
+
+use super::{by_name, has_header};
+use crate::base::address::refuse_frames;
+use crate::base::error::{Error, Note, Remedy, Result};
+use crate::base::output::STANDARD;
+use crate::formats::format::{Format, Reader};
+use crate::formats::shared::extension::extension;
+use crate::formats::zarr::metadata_file;
+use crate::formats::{file_series, numbering, vtk, vtk_xml};
+use crate::source::OpenOptions;
+use crate::source::series::FrameFiles;
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The files that the inputs stand for.
+pub(crate) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameFiles> {
+    refuse_frames(inputs)?;
+    let files = match inputs {
+        [only] => expand_one(only, options)?,
+        _ => FrameFiles { paths: listed(inputs)?, ..FrameFiles::default() },
+    };
+    refuse_twice(&files.paths)?;
+    if files.times.is_empty() && !options.allow_gaps {
+        if inputs.len() == 1 {
+            numbering::check_one_series(&files.paths)?;
+        }
+        numbering::check(&files.paths)?;
+    }
+    Ok(files)
+}
+
+/// Whether the inputs are files with headers.
+pub(crate) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
+    let files = expand(inputs, &options.for_headers());
+    files.is_ok_and(|files| has_header(&files.paths[0]))
+}
+
+/// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case,
+/// no dot), those that match a pattern, or the one of that name, which need not exist.
+///
+/// # Errors
+/// A folder that cannot be listed, an invalid pattern, and either without any such file.
+pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
+    if !input.is_dir() {
+        return if !input.exists() && is_pattern(input) { matching(input) } else { Ok(vec![input.into()]) };
+    }
+    let mut files = visible_files(input)?;
+    files.retain(|file| self::extension(file) == extension);
+    if files.is_empty() {
+        return Err(Error::path(input, format!("has no .{extension} file")));
+    }
+    Ok(files)
+}
+
+fn expand_one(input: &Path, options: &OpenOptions) -> Result<FrameFiles> {
+    if input.is_dir() && metadata_file(input).is_none() {
+        return directory(input, options);
+    }
+    if !input.exists() && is_pattern(input) {
+        return Ok(FrameFiles { paths: matching(input)?, ..FrameFiles::default() });
+    }
+    match by_name(input).map(|format| &format.reader) {
+        Some(Reader::List(read)) => read(input),
+        _ => Ok(FrameFiles { paths: vec![input.into()], ..FrameFiles::default() }),
+    }
+}
+
+fn listed(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    if inputs.is_empty() {
+        return Err(Error::setting("inputs", "no input was given"));
+    }
+    for input in inputs {
+        if input == Path::new(STANDARD) {
+            return Err(Error::path(STANDARD, "standard input must be the only input"));
+        }
+        if input.is_dir() {
+            return Err(Error::path(input, "a directory must be the only input"));
+        }
+        if !input.exists() && is_pattern(input) {
+            return Err(Error::path(input, "a pattern must be the only input"));
+        }
+    }
+    Ok(inputs.to_vec())
+}
+
+fn refuse_twice(paths: &[PathBuf]) -> Result<()> {
+    let mut seen = HashSet::new();
+    let plain = |p: &Path| p.components().filter(|c| !matches!(c, std::path::Component::CurDir)).collect::<PathBuf>();
+    match paths.iter().find(|p| !seen.insert(plain(p))) {
+        Some(path) => Err(Error::path(path, "is given twice")),
+        None => Ok(()),
+    }
+}
+
+fn is_pattern(path: &Path) -> bool {
+    path.to_string_lossy().contains(['*', '?', '['])
+}
+
+fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
+    let refused = |what: String| Error::path(pattern, what);
+    let text = pattern.to_str().ok_or_else(|| refused("a pattern must be UTF-8".into()))?;
+    let rules =
+        glob::MatchOptions { require_literal_separator: true, require_literal_leading_dot: true, ..Default::default() };
+    let matches = glob::glob_with(text, rules).map_err(|e| refused(format!("is no valid pattern: {e}")))?;
+    let mut paths = Vec::new();
+    for path in matches {
+        let path = path.map_err(|e| {
+            let place = e.path().to_path_buf();
+            Error::io(place, "listing", e.into())
+        })?;
+        paths.extend(path.is_file().then_some(path));
+    }
+    if paths.is_empty() {
+        return Err(refused("no file matches this pattern".into()));
+    }
+    alphanumeric_sort::sort_path_slice(&mut paths);
+    Ok(paths)
+}
+
+fn directory(folder: &Path, options: &OpenOptions) -> Result<FrameFiles> {
+    let all = visible_files(folder)?;
+    let in_format = |format: &'static Format| all.iter().filter(move |p| by_name(p).is_some_and(|own| own.is(format)));
+    let mut lists: Vec<_> = in_format(&vtk_xml::PVD).collect();
+    if lists.is_empty() {
+        lists.extend(in_format(&file_series::FORMAT));
+    }
+    match lists[..] {
+        [list] if options.dims.is_none() => {
+            let mut files = expand_one(list, options)?;
+            files.notes.push(format!("the frames and times are those of {}", list.display()).into());
+            return Ok(files);
+        }
+        [a, b, ..] if in_format(&vtk_xml::VTI).chain(in_format(&vtk::FORMAT)).next().is_none() => {
+            let what = format!("has several lists of files, {} and {}: name one of them", name(a), name(b));
+            return Err(Error::path(folder, what));
+        }
+        _ => {}
+    }
+    let frames = |p: &&PathBuf| match by_name(p) {
+        Some(format) => options.dims.is_none() && format.holds_frames(),
+        None => options.dims.is_some(),
+    };
+    let mut paths: Vec<PathBuf> = all.iter().filter(frames).cloned().collect();
+    if paths.iter().any(|p| extension(p) == "pvti") {
+        paths.retain(|p| extension(p) != "vti"); // the pieces
+    }
+    let paths = one_extension(folder, paths)?;
+    Ok(FrameFiles { paths, ..FrameFiles::default() })
+}
+
+fn visible_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |e| Error::io(folder, "listing", e);
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let hidden = name(&path).starts_with('.');
+        files.extend((!hidden && path.is_file()).then_some(path));
+    }
+    alphanumeric_sort::sort_path_slice(&mut files);
+    Ok(files)
+}
+
+fn one_extension(folder: &Path, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
+    let Some(first) = files.first() else {
+        return Err(Error::path(folder, Note::with("has no file of frames", Remedy::DescribeSamples)));
+    };
+    let first_extension = extension(first);
+    if let Some(other) = files.iter().find(|p| extension(p) != first_extension) {
+        let what = format!("mixes formats, for example {} and {}", name(first), name(other));
+        let pattern = folder.join(format!("*.{first_extension}"));
+        let hint = format!("a pattern in quotes such as '{}' chooses", pattern.display());
+        return Err(Error::path(folder, format!("{what}; {hint}")));
+    }
+    Ok(files)
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::sample::SampleType;
+    use crate::formats::testing::{DIMS, Folder, check_inputs, payload, refused};
+
+    const TY: SampleType = SampleType::U16;
+
+    fn raw() -> OpenOptions {
+        OpenOptions { dims: Some(DIMS.into()), sample: Some(TY), ..OpenOptions::default() }
+    }
+
+    fn frames(folder: &Folder, frames: std::ops::Range<usize>) -> Vec<PathBuf> {
+        frames.map(|t| folder.write(&format!("f{t}.raw"), payload(TY, t..t + 1, false))).collect()
+    }
+
+    #[test]
+    fn a_directory_and_a_pattern_are_sorted_by_number() {
+        let folder = Folder::new();
+        frames(&folder, 0..12);
+        folder.write(".hidden.raw", "x");
+        folder.write("a.wspl", "x");
+        fs::create_dir(folder.path("f3.raw.d")).expect("folder");
+        check_inputs(&[folder.path("")], &raw(), TY, 12);
+        check_inputs(&[folder.path("f*.raw")], &raw(), TY, 12);
+        check_inputs(&[folder.path("f?.raw")], &raw(), TY, 10);
+    }
+
+    #[test]
+    fn one_name_stands_for_files_of_one_ending() {
+        let folder = Folder::new();
+        let pictures = ["f2.png", "f10.PNG"].map(|name| folder.write(name, "x"));
+        folder.write("f3.txt", "x");
+        assert_eq!(files(&folder.path(""), "png").expect("a folder"), pictures);
+        assert_eq!(files(&folder.path("f?.png"), "png").expect("a pattern"), pictures[..1]);
+        assert_eq!(files(&folder.path("gone.png"), "png").expect("a name"), [folder.path("gone.png")]);
+        assert!(files(&folder.path(""), "npy").is_err() && files(&folder.path("g*.png"), "png").is_err());
+    }
+
+    #[test]
+    fn a_list_is_taken_in_its_order() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..3);
+        files.reverse();
+        let listed = expand(&files, &raw()).expect("list");
+        assert_eq!(listed.paths, files);
+    }
+
+    #[test]
+    fn missing_frames_are_refused_unless_allowed() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..5);
+        fs::remove_file(files.remove(3)).expect("removing");
+        for inputs in [files.clone(), vec![folder.path("")], vec![folder.path("*.raw")]] {
+            refused(&inputs, &raw(), "f2.raw is followed by f4.raw");
+            let options = OpenOptions { allow_gaps: true, ..raw() };
+            assert_eq!(crate::formats::open(&inputs, &options).expect("gaps").archive().frames, Some(4));
+        }
+    }
+
+    #[test]
+    fn files_that_are_not_there_are_named() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..2);
+        files.push(folder.path("f2.raw"));
+        refused(&files, &raw(), "f2.raw: opening");
+        refused(&[folder.path("gone.npy")], &OpenOptions::default(), "gone.npy: opening");
+        refused(&[folder.path("g*.raw")], &raw(), "no file matches");
+        refused(&[folder.path("[")], &raw(), "no valid pattern");
+    }
+
+    #[test]
+    fn unclear_inputs_are_refused() {
+        let folder = Folder::new();
+        let files = frames(&folder, 0..2);
+        let (a, b) = (files[0].clone(), files[1].clone());
+        refused(&[], &raw(), "no input");
+        refused(&[a.clone(), b.clone(), folder.path("./f0.raw")], &raw(), "given twice");
+        refused(&[a.clone(), "-".into()], &raw(), "must be the only input");
+        refused(&[a.clone(), folder.path("")], &raw(), "directory must be the only");
+        refused(&[a.clone(), folder.path("*.raw")], &raw(), "pattern must be the only");
+        refused(&[folder.path("")], &OpenOptions::default(), "has no file of frames");
+        refused(&[folder.write("a.wspl", "x")], &OpenOptions::default(), "coefficient file already");
+        folder.write("c.dat", payload(TY, 0..1, false));
+        refused(&[folder.path("")], &raw(), "mixes formats, for example c.dat and f0.raw");
+    }
+
+    #[test]
+    fn a_frame_unlike_the_first_is_named() {
+        let folder = Folder::new();
+        let mut files = frames(&folder, 0..2);
+        files.push(folder.write("f2.raw", "short"));
+        refused(&files, &raw(), "f2.raw: expected 210 bytes");
+    }
+
+    #[test]
+    fn options_for_headerless_data_are_refused_elsewhere() {
+        let folder = Folder::new();
+        let file = [folder.write("a.npy", "x")];
+        let headerless = format!("{} says itself what it holds; this is for headerless data", file[0].display());
+        for (options, setting) in [
+            (raw(), "dims"),
+            (OpenOptions { offset: 1, ..OpenOptions::default() }, "offset"),
+            (OpenOptions { big_endian: true, ..OpenOptions::default() }, "big_endian"),
+            (OpenOptions { sample: Some(TY), ..OpenOptions::default() }, "sample"),
+        ] {
+            refused(&file, &options, &format!("{setting}: {headerless}"));
+        }
+        let named = OpenOptions { variable: Some("a".into()), ..OpenOptions::default() };
+        refused(&file, &named, "a.npy has one array; this is for files that have names");
+    }
+}

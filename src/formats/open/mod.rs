@@ -1,0 +1,181 @@
+//! Opens inputs: finds the files, which format each has, by its extension, or by its first bytes where the extension says
+//! nothing, and reads their headers.
+
+pub(crate) mod inputs;
+mod magnitude;
+#[cfg(test)]
+mod series_tests;
+mod stream;
+
+use super::arrays::held::{self, NamedArrays};
+use super::format::{Choices, Format, Reader};
+use super::shared::extension::extension;
+use super::{FORMATS, nifti, npy, raw, zarr};
+use crate::base::error::{Error, Note, Remedy, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::output::STANDARD;
+use crate::source::file_header::{FileHeader, head};
+use crate::source::series::Series;
+use crate::source::{Extent, FrameSource, OpenOptions, VariableInfo};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`,
+/// `.series`), or `-` for standard input.
+///
+/// The header and size of every file are checked here; samples are read by [`FrameSource::window`].
+///
+/// # Errors
+/// Files that are absent, damaged, of a format or with a feature that is not supported, or unlike the first one;
+/// numbers in names that suggest a missing frame; options that do not apply to the format.
+pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    if let [only] = inputs
+        && only == Path::new(STANDARD)
+    {
+        return open_stream(std::io::stdin(), options);
+    }
+    if !options.magnitude.is_empty() {
+        return magnitude::open(inputs, options);
+    }
+    if options.dims_are_remembered && inputs::have_headers(inputs, options) {
+        return open_files(inputs, &options.for_headers());
+    }
+    open_files(inputs, options)
+}
+
+fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    let files = inputs::expand(inputs, options)?;
+    Ok(Box::new(Series::open(&files, options, |path, extent| describe(path, options, extent))?))
+}
+
+/// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A
+/// stream has one.
+///
+/// # Errors
+/// Files that are absent, damaged or of a format that is not supported.
+pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+    if options.variable.is_some()
+        || !options.magnitude.is_empty()
+        || options.dims.is_some()
+        || inputs == [Path::new(STANDARD)]
+    {
+        return Ok(Vec::new());
+    }
+    choices(&inputs::expand(inputs, options)?.paths[0], options)
+}
+
+/// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`, or one for each
+/// frame.
+///
+/// # Errors
+/// As [`open`]; messages call the stream `-`.
+pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    Ok(Box::new(stream::Stream::open(reader, options)?))
+}
+
+/// Opens named arrays that the caller holds or computes; `name` stands for them in messages. The variable is chosen, and
+/// the meaning of its axes found, as for a NetCDF file. So converting it gives the bytes that the file would give.
+///
+/// # Errors
+/// No variable with three axes, or several; options for headerless data.
+pub fn open_arrays(
+    name: impl AsRef<Path>,
+    arrays: &Arc<dyn NamedArrays>,
+    options: &OpenOptions,
+) -> Result<Box<dyn FrameSource>> {
+    let name = name.as_ref();
+    let header = held::describe(name, arrays, options)?;
+    Ok(Box::new(Series::single(header, name, options)?))
+}
+
+/// The format by extension; `None` for headerless data and unsupported formats.
+pub(super) fn by_name(path: &Path) -> Option<&'static Format> {
+    let found = extension(path);
+    FORMATS.into_iter().find(|format| format.extensions.contains(&found.as_str()))
+}
+
+/// The format by extension, or Zarr for a folder that is a Zarr store.
+fn of_file(path: &Path) -> Option<&'static Format> {
+    let is_store = path.is_dir() && zarr::metadata_file(path).is_some();
+    if is_store { Some(&zarr::FORMAT) } else { by_name(path) }
+}
+
+const FIRST_READ: usize = 1 << 10; // bytes; what a format is known by is in them
+
+fn by_content(path: &Path) -> Result<Option<&'static Format>> {
+    let head = head(&FileBytes::open(path, Access::Read)?, FIRST_READ)?;
+    let starts = |format: &&Format| format.starts.iter().any(|start| head.starts_with(start));
+    let is_nifti = || nifti::is_nifti(&head) || nifti::header_of(path).is_some();
+    Ok(FORMATS.into_iter().find(starts).or_else(|| is_nifti().then_some(&nifti::FORMAT)))
+}
+
+/// Whether a file has a header that describes its contents.
+fn has_header(path: &Path) -> bool {
+    of_file(path).is_some() || by_content(path).is_ok_and(|format| format.is_some())
+}
+
+fn format_of(path: &Path, options: &OpenOptions) -> Result<Option<&'static Format>> {
+    match of_file(path) {
+        None if options.dims.is_none() => by_content(path),
+        format => Ok(format),
+    }
+}
+
+/// Reads the header of a file of frames and checks its size; beside the samples, what `extent` says.
+fn describe(path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
+    let Some(format) = format_of(path, options)? else {
+        let unknown = || Error::path(path, Note::with("is of no known format", Remedy::DescribeSamples));
+        return if options.dims.is_none() { Err(unknown()) } else { raw::FORMAT.describe(path, options, extent) };
+    };
+    refuse_options(path, format, options)?;
+    format.describe(path, options, extent)
+}
+
+/// The variables of a file among which the user must choose; none if it is clear which one is meant.
+fn choices(path: &Path, options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+    match format_of(path, options)?.map(|format| &format.reader) {
+        Some(Reader::Arrays(Ok(open))) => open(path, options)?.undecided(),
+        Some(Reader::Frames(_, Choices::Variables(undecided))) => undecided(path),
+        Some(Reader::Frames(_, Choices::Components)) => Ok(components(path, options)),
+        _ => Ok(Vec::new()), // opening it says what is not built in
+    }
+}
+
+/// Components that are listed, where one array has several.
+const MOST_COMPONENTS: usize = 16;
+
+/// The components of a file's only array, if it has several; none of a file that cannot be read.
+fn components(path: &Path, options: &OpenOptions) -> Vec<VariableInfo> {
+    let component = |index: usize| {
+        let options = OpenOptions { variable: Some(format!("[{index}]")), ..options.clone() };
+        let header = describe(path, &options, Extent::AlongTime).ok()?;
+        let (name, shape) = (header.variable.unwrap_or_default(), header.shape);
+        Some(VariableInfo {
+            unit: header.units.samples,
+            ..VariableInfo::volume(&name, shape.sample().name(), shape.dims(), 1)
+        })
+    };
+    let found: Vec<_> = (0..MOST_COMPONENTS).map_while(component).collect();
+    if found.len() > 1 { found } else { Vec::new() }
+}
+
+/// Refuses options that would be ignored, so that users do not think that they had an effect.
+fn refuse_options(path: &Path, format: &Format, options: &OpenOptions) -> Result<()> {
+    let given = [
+        (options.dims.is_some(), "dims"),
+        (options.sample.is_some(), "sample"),
+        (options.big_endian, "big_endian"),
+        (options.offset > 0, "offset"),
+        (options.variable.is_some() && format.is(&npy::FORMAT) && !options.variable_is_remembered, "variable"),
+        (options.axes.is_some() && !matches!(format.reader, Reader::Arrays(_)), "axes"),
+    ];
+    let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
+    let what = match setting {
+        "variable" => "has one array; this is for files that have names",
+        "axes" => "says itself what its axes count; this is for HDF5, NetCDF and Zarr",
+        _ if format.holds_frames() => "says itself what it holds; this is for headerless data, leave it out",
+        _ => return Ok(()),
+    };
+    Err(Error::setting(setting, format!("{} {what}", path.display())))
+}

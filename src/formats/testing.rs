@@ -1,0 +1,67 @@
+//! What the tests of the formats share: files, and what opening them gives.
+
+pub(crate) use crate::source::testing::{DIMS, check_source, check_window, message, payload, value};
+
+use super::open::open;
+use crate::base::mapped::Access;
+use crate::base::sample::SampleType;
+use crate::source::OpenOptions;
+use std::fs;
+use std::path::PathBuf;
+
+/// A folder that vanishes with the test.
+pub(crate) struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub(crate) fn new() -> Self {
+        Self(tempfile::tempdir().expect("temporary folder"))
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        fs::write(&path, bytes).expect("writing");
+        path
+    }
+}
+
+/// Checks that inputs hold `frames` frames of the tests' values, by map and by read.
+pub(crate) fn check_inputs(inputs: &[PathBuf], options: &OpenOptions, ty: SampleType, frames: usize) {
+    for access in [Access::Map, Access::Read] {
+        let mut source = open(inputs, &OpenOptions { access, ..options.clone() }).expect("opening");
+        assert_eq!(source.archive().frames, Some(frames));
+        check_source(&mut *source, ty, frames);
+        assert!(source.window(frames, 1).is_err(), "beyond the end");
+        assert_eq!(source.window(frames, 0).expect("nothing").frames(), 0);
+    }
+}
+
+/// Checks that opening fails and that the message has these words.
+pub(crate) fn refused(inputs: &[PathBuf], options: &OpenOptions, words: &str) {
+    let message = message(open(inputs, options));
+    assert!(message.contains(words), "{words:?} is not in {message:?}");
+}
+
+/// Opens and reads a file with every one of its bytes changed in turn: whatever it says, nothing may panic.
+pub(crate) fn survives_damage(name: &str, good: &[u8]) {
+    survives_damage_in(0..good.len(), name, good);
+}
+
+/// As [`survives_damage`], of some of its bytes.
+pub(crate) fn survives_damage_in(bytes: std::ops::Range<usize>, name: &str, good: &[u8]) {
+    let folder = Folder::new();
+    for (at, byte) in bytes.flat_map(|at| b"\0\xff9-<(% ".map(|byte| (at, byte))) {
+        let mut bad = good.to_vec();
+        bad[at] = byte;
+        let Ok(mut source) = open(&[folder.write(name, bad)], &OpenOptions::default()) else { continue };
+        let whole = source.archive().grid.whole();
+        let mut out = vec![0; whole.voxels() * source.archive().sample.size()];
+        let frames = source.archive().frames.expect("files have a known number of frames");
+        if let Ok(window) = source.window(0, frames) {
+            let _ = window.read_box(0, &whole, &mut out);
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! VTK's legacy files, `.vtk`: one array of STRUCTURED_POINTS, binary or as text.
+
+mod header;
+mod lines;
+mod read;
+#[cfg(test)]
+mod tests;
+
+use super::format::{Choices, Format, Reader};
+
+pub(crate) static FORMAT: Format = Format { starts: &[header::MAGIC], ..Format::new("legacy VTK", &["vtk"], READER) };
+
+const READER: Reader = Reader::Frames(
+    Ok(|path, options, _| read::describe(path, options.variable.as_deref())),
+    Choices::Variables(read::undecided),
+);

@@ -1,0 +1,75 @@
+//! Reads VTK's legacy files.
+
+use super::header::{VtkArray, VtkHeader, stored_type};
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::stored::StoredType;
+use crate::formats::shared::component::{self, Chosen};
+use crate::formats::shared::pieces::{Piece, Pieces};
+use crate::formats::shared::text::Words;
+use crate::source::file_header::FileHeader;
+use crate::source::layout::Shape;
+use crate::source::layout::{Axis, Layout};
+use crate::source::parts::{DataLocation, Part, Stored};
+use crate::source::{Parsed, VariableInfo};
+use std::path::Path;
+
+/// Goes through the text of one file and finds the array.
+pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
+    let file = FileBytes::open(path, Access::Read)?;
+    let header = VtkHeader::read(&file)?;
+    let chosen = component::choose(&header.names(), header.scalars.first().copied(), variable);
+    let chosen = chosen.map_err(|e| Error::input(path, e))?;
+    let array = &header.arrays[chosen.array];
+    let (shape, stored) = stored(&header, array, chosen).map_err(|e| Error::input(path, e))?;
+    let at = if header.ascii { text(&file, array, stored.ty, shape.dims()) } else { DataLocation::Byte(array.start) };
+    let part = Part { path: path.into(), state: file.state(), frames: 1, stored, at };
+    let mut described = FileHeader::plain(shape, vec![part]);
+    described.spacing = header.spacing;
+    described.origin = array.of.origin(header.points, header.origin, header.spacing);
+    described.times = header.time.into_iter().collect();
+    described.variable = Some(component::label(&array.name, array.components, chosen.component));
+    Ok(described)
+}
+
+/// The arrays among which the user must choose; none if it is clear which one is meant.
+pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
+    let header = VtkHeader::read(&FileBytes::open(path, Access::Read)?)?;
+    if !component::is_undecided(&header.names(), header.scalars.first().copied()) {
+        return Ok(Vec::new());
+    }
+    let variable = |array: &VtkArray| {
+        let sample = stored_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
+        VariableInfo::volume(&array.name, sample, array.of.dims(header.points), array.components)
+    };
+    Ok(header.arrays.iter().map(variable).collect())
+}
+
+/// An array as text: all of it is one piece.
+fn text(file: &FileBytes, array: &VtkArray, ty: StoredType, dims: [usize; 3]) -> DataLocation {
+    let samples = Words { start: array.start, count: array.components * array.tuples, ty };
+    let (path, state) = (file.path().into(), file.state());
+    let piece = Piece { path, state, start: [0; 3], dims, samples: Box::new(samples) };
+    DataLocation::Decoded(Box::new(Pieces {
+        dims,
+        voxel: array.components * ty.size(),
+        together: 1,
+        frames: vec![vec![piece]],
+    }))
+}
+
+fn stored(header: &VtkHeader, array: &VtkArray, chosen: Chosen) -> Parsed<(Shape, Stored)> {
+    let refused = |what: String| format!("array {}: {what}", array.name);
+    let Some(ty) = stored_type(&array.ty) else {
+        let types = "unsigned_char to int, vtktypeint64, float and double are";
+        return Err(refused(format!("type {} is not supported; {types}", array.ty)));
+    };
+    let shape = Shape::new(array.of.dims(header.points), ty.sample())?;
+    let samples = shape.frame_bytes() / ty.sample().size();
+    if array.tuples != samples {
+        return Err(refused(format!("has {} samples, but DIMENSIONS need {samples}", array.tuples)));
+    }
+    let mut layout = Layout::plain(shape.dims(), 1);
+    layout.0.push(Axis::single(chosen.component, array.components));
+    Ok((shape, Stored::new(&layout, ty, true)?))
+}

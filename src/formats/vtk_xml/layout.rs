@@ -1,0 +1,26 @@
+//! The names of types in VTK's XML.
+
+use crate::base::stored::StoredType;
+use crate::formats::shared::types::Types;
+
+pub(super) const TYPES: Types<&str> = Types(&[
+    (StoredType::U8, &["UInt8"]),
+    (StoredType::I8, &["Int8"]),
+    (StoredType::U16, &["UInt16"]),
+    (StoredType::I16, &["Int16"]),
+    (StoredType::U32, &["UInt32"]),
+    (StoredType::I32, &["Int32"]),
+    (StoredType::U64, &["UInt64"]),
+    (StoredType::I64, &["Int64"]),
+    (StoredType::F32, &["Float32"]),
+    (StoredType::F64, &["Float64"]),
+]);
+
+/// What image data is called in a description.
+pub(super) const IMAGE_DATA: &str = "VTK image data";
+
+/// What a rectilinear grid is called in a description.
+pub(super) const RECTILINEAR_GRID: &str = "VTK rectilinear grid";
+
+/// The field with the time of a file.
+pub(super) const TIME: &str = "TimeValue";

@@ -1,0 +1,135 @@
+//! Writes extracted samples to a Zarr store. The folder has another name until it is complete.
+
+use super::layout::{GROUP, METADATA};
+use super::store::{LEVEL, Store};
+use crate::base::error::{Error, Note, Remedy, Result};
+use crate::formats::contents::Contents;
+use crate::formats::encoding::Encoding;
+use crate::formats::writer::SampleSink;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// A store that is being written.
+#[derive(Debug)]
+struct StoreSink {
+    folder: PartialFolder,
+    store: Store,
+    encoding: Encoding,
+    /// Name and samples of the chunks that are left, the next one last.
+    chunks: Vec<(String, u64)>,
+    /// The bytes of the chunk being filled, as they are stored.
+    bytes: Vec<u8>,
+    force: bool,
+}
+
+/// Writes everything but the samples; an existing store is an error unless `force` replaces it.
+pub(super) fn create(path: &Path, contents: &Contents, encoding: Encoding, force: bool) -> Result<Box<dyn SampleSink>> {
+    check(path, force)?;
+    let store = Store::new(contents, encoding.to);
+    let folder = PartialFolder::create(path)?;
+    for (name, bytes) in &store.files {
+        folder.write(name, bytes)?;
+    }
+    let mut chunks = store.chunks.list();
+    chunks.reverse();
+    Ok(Box::new(StoreSink { folder, store, encoding, chunks, bytes: Vec::new(), force }))
+}
+
+impl SampleSink for StoreSink {
+    fn write(&mut self, mut samples: &[u8]) -> Result<()> {
+        while let (Some((_, count)), false) = (self.chunks.last(), samples.is_empty()) {
+            let wanted = *count as usize * self.encoding.to.size() - self.bytes.len();
+            let take = (wanted / self.encoding.to.size() * self.encoding.from.size()).min(samples.len());
+            let (these, others) = samples.split_at(take);
+            let failed = |e| Error::io(&self.folder.path, "writing", e);
+            self.encoding.write(these, &mut self.bytes).map_err(failed)?;
+            samples = others;
+            if *count as usize * self.encoding.to.size() == self.bytes.len() {
+                self.end_chunk()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives the store its name.
+    fn finish(self: Box<Self>) -> Result<()> {
+        self.folder.write(Path::new(METADATA), &self.store.metadata)?;
+        self.folder.commit(self.force)
+    }
+}
+
+impl StoreSink {
+    /// Compresses and writes a chunk. One at the far end is filled up to its whole length.
+    fn end_chunk(&mut self) -> Result<()> {
+        let Some((name, _)) = self.chunks.pop() else { return Ok(()) };
+        self.bytes.resize(self.store.chunks.samples() as usize * self.encoding.to.size(), 0);
+        let packed = zstd::bulk::compress(&self.bytes, LEVEL);
+        let packed = packed.map_err(|e| Error::io(&self.folder.path, "compressing", e))?;
+        self.bytes.clear();
+        self.folder.write(&self.store.samples.join(name), &packed)
+    }
+}
+
+/// Checks in advance that the store can be created, as far as that is possible.
+fn check(path: &Path, force: bool) -> Result<()> {
+    if !path.exists() {
+        return Ok(());
+    }
+    match (is_store(path), force) {
+        (true, true) => Ok(()),
+        (true, false) => Err(Error::path(path, Note::with("exists already", Remedy::Replace))),
+        (false, _) => Err(Error::path(path, "exists already, and is no Zarr store")),
+    }
+}
+
+fn is_store(path: &Path) -> bool {
+    path.join(GROUP).is_file()
+}
+
+/// A folder that is removed on drop unless it is committed.
+#[derive(Debug)]
+struct PartialFolder {
+    path: PathBuf,
+    part: PathBuf,
+}
+
+impl PartialFolder {
+    fn create(path: &Path) -> Result<Self> {
+        let mut part = path.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        match fs::create_dir(&part) {
+            Ok(()) => Ok(Self { path: path.into(), part }),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
+                let what = "is in the way: it is that of another run, or of one that was killed; remove it";
+                Err(Error::path(part, what))
+            }
+            Err(e) => Err(Error::io(part, "creating the folder", e)),
+        }
+    }
+
+    fn write(&self, name: &Path, bytes: &[u8]) -> Result<()> {
+        let path = self.part.join(name);
+        let failed = |e| Error::io(&path, "writing", e);
+        path.parent().map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
+        let mut file = fs::File::create(&path).map_err(failed)?;
+        file.write_all(bytes).map_err(failed)
+    }
+
+    /// Gives the folder its name. With `force` a store of that name is removed first.
+    fn commit(self, force: bool) -> Result<()> {
+        check(&self.path, force)?;
+        let failed = |e| Error::io(&self.path, "replacing", e);
+        if is_store(&self.path) {
+            fs::remove_dir_all(&self.path).map_err(failed)?;
+        }
+        fs::rename(&self.part, &self.path).map_err(failed)
+    }
+}
+
+impl Drop for PartialFolder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.part); // it is gone if it was committed
+    }
+}
