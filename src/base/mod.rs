@@ -6,6 +6,7 @@ mod remedy;
 pub mod error;
 pub mod progress;
 pub(crate) mod memory;
+pub(crate) mod vectors;
 pub(crate) mod zeroed;
 #[doc(hidden)]
 pub mod text;

@@ -2,6 +2,7 @@
 
 use super::WindowCodec;
 use crate::base::sample::{self, SampleType};
+use crate::base::vectors::dispatch;
 use crate::codec::bound::Bound;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::Outliers;
@@ -134,8 +135,8 @@ impl LaneStats {
         let mut stats = Self::empty();
         let declared = codec.missing_value.unwrap_or(f64::NAN); // NaN equals no value
         match (codec.sample, codec.promise.bound) {
-            (SampleType::F32, Bound::Pointwise) => compare_singles(&mut stats, compared, declared),
-            (SampleType::F64, Bound::Pointwise) => compare_doubles(&mut stats, compared, declared),
+            (SampleType::F32, Bound::Pointwise) => dispatch!(compare_singles(&mut stats, compared, declared)),
+            (SampleType::F64, Bound::Pointwise) => dispatch!(compare_doubles(&mut stats, compared, declared)),
             _ => return Self::under_any_bound(codec, compared, declared),
         }
         stats.sums = stats.largest;
@@ -176,7 +177,7 @@ impl LaneStats {
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
@@ -184,7 +185,7 @@ fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         stats.add(decoded, decoded, source, declared);

@@ -6,6 +6,7 @@ use super::codes::Codes;
 use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::{self, Change};
+use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
 use wavesplat_format::{Pyramid, SparseCodes};
 
@@ -72,7 +73,7 @@ impl<'a> Plane<'a> {
             return Self::Zero;
         }
         scratch.resize(codes.len(), 0.0);
-        scale(step, codes, scratch);
+        dispatch!(scale(step, codes, &mut scratch[..]));
         Self::Double(scratch)
     }
 }
@@ -136,8 +137,8 @@ impl<'a> Field<'a> {
     fn load(&self, first: usize, out: &mut [f64]) {
         match &self.values {
             Values::Zero => out.fill(0.0),
-            Values::Codes { step, codes } => scale(*step, &codes[first..], out),
-            Values::Single(values) => widen(&values[first..], out),
+            Values::Codes { step, codes } => dispatch!(scale(*step, &codes[first..], out)),
+            Values::Single(values) => dispatch!(widen(&values[first..], out)),
             Values::Double(values) => out.copy_from_slice(&values[first..first + out.len()]),
         }
     }
@@ -250,12 +251,12 @@ impl<'a> Run<'a> {
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn scale(step: f64, codes: &[i32], out: &mut [f64]) {
     out.iter_mut().zip(codes).for_each(|(v, code)| *v = f64::from(*code) * step);
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn widen(values: &[f32], out: &mut [f64]) {
     out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
 }

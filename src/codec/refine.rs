@@ -78,7 +78,7 @@ impl Source<'_> {
         codes.resize(passes.codes(), 0);
         field.resize(passes.nodes().iter().product(), R::default());
         let mut encode = |step| {
-            let fits = passes.encode(step, (source, outer.size), (field, split), codes);
+            let fits = passes.encode(step, source, outer.size, field, split, codes);
             fits.then(|| self.checked(&weighing, &passes, field, codes))
         };
         let mut checked = encode(step)?;

@@ -68,7 +68,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         field.resize(passes.nodes().iter().product(), R::default());
         codes.resize(passes.codes(), 0);
-        if !passes.encode(step, (&self.nodes, self.outer), (field, split), codes) {
+        if !passes.encode(step, &self.nodes, self.outer, field, split, codes) {
             return None;
         }
         let outliers = source.estimate_outliers(weighing, field, &passes.marked_codes(codes));

@@ -5,6 +5,7 @@
 //! earlier ones, functions of single frames follow.
 
 use super::{Haar, LANES, Lane, TimeBasis, synthesis};
+use crate::base::vectors::dispatch;
 
 /// The unit of a stored function's values.
 const UNIT: f64 = 1.0 / 32768.0;
@@ -84,11 +85,11 @@ impl TimeBasis for Learned {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        sums_of_products(&self.rows, series, coefficients);
+        dispatch!(sums_of_products(&self.rows[..], series, coefficients));
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        sums_of_products(&self.columns, coefficients, series);
+        dispatch!(sums_of_products(&self.columns[..], &*coefficients, series));
     }
 
     fn only(&self, marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
@@ -101,7 +102,7 @@ impl TimeBasis for Learned {
 }
 
 /// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last (eq 5, or its transpose).
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn sums_of_products(factors: &[Vec<f64>], lanes: &[Lane], out: &mut [Lane]) {
     let (some, last) = factors.as_chunks::<SIDE_BY_SIDE>();
     let (some_out, last_out) = out.as_chunks_mut::<SIDE_BY_SIDE>();

@@ -11,6 +11,7 @@ use super::cells::{Aligned, CellPlane, LINE, Rectangle};
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
+use crate::base::vectors::dispatch;
 use crate::codec::real::Real;
 use crate::render::plane_values::PlaneValues;
 use std::ops::Range;
@@ -139,7 +140,7 @@ impl Placed {
             sums = sums.resized(area);
         }
         sums.fill(S::default());
-        add_block(self, values, &mut sums, work);
+        dispatch!(add_block(self, values, &mut sums[..], work));
         sums
     }
 
@@ -205,7 +206,7 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
     Rectangle::holding([u.0, v.0], [u.1, v.1], q)
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_block<R: Real, S: Real>(placed: &Placed, values: &BlockValues<'_, R>, sums: &mut [S], work: &mut Work<S>) {
     let Spreading { shear, degree, .. } = &placed.spreading;
     match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
