@@ -80,7 +80,7 @@ impl Group {
         self.dropped = counts; // first try to keep none
         loop {
             self.reconstruct(codec, step);
-            let errors = self.errors(codec.promise.measure());
+            let errors = self.errors(codec.bound.measure());
             for l in 0..LANES {
                 let end = if errors[l] <= 1.0 { &mut holds[l] } else { &mut fails[l] };
                 *end = self.dropped[l];

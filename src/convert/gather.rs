@@ -156,7 +156,7 @@ impl<'a> WindowReader<'a> {
     /// Takes over a window's record as if the window had just been coded.
     fn continue_after(&mut self, window: &Window) {
         self.range = Some(window.range).filter(|range| range.0 <= range.1 && self.config.range.is_none());
-        self.scheme = Some(Scheme::of_window(window));
+        self.scheme = Some(Scheme::from_window(window));
         self.frames += u64::from(window.frames);
     }
 

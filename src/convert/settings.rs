@@ -52,7 +52,7 @@ pub fn of_file(file: &Metadata, memory: usize) -> Option<ConvertConfig> {
         None => None,
     };
     let colours = match named("colours") {
-        Some(colours) => Some(TransferFunction::of_text(colours)?),
+        Some(colours) => Some(TransferFunction::parse(colours)?),
         None => None,
     };
     let missing_value = match named("missing-value") {
@@ -92,7 +92,7 @@ pub fn options(file: &Metadata) -> Vec<(&'static str, String)> {
         }
         Bound::Pointwise | Bound::Rms => {}
     }
-    let colours = setting(file, "colours").and_then(TransferFunction::of_text);
+    let colours = setting(file, "colours").and_then(TransferFunction::parse);
     if let Some((colours, name)) = colours.as_ref().and_then(|colours| Some((colours, colours.name()?))) {
         let (lo, hi) = colours.range();
         options.extend([("transfer-function", name.into()), ("range", format!("{lo:?},{hi:?}"))]);

@@ -35,7 +35,7 @@ impl Files {
             }
             SampleFormat::Pvd => {
                 let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, "vti"));
-                (frames.iter().map(|frame| folder.join(names.of(*frame))).collect(), Some(path.into()))
+                (frames.iter().map(|frame| folder.join(names.path(*frame))).collect(), Some(path.into()))
             }
             SampleFormat::Nhdr => {
                 stem(path)?;
@@ -78,7 +78,7 @@ fn numbered(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Vec<P
         ));
     }
     let names = Numbered::new(path, frames.len())?;
-    Ok(frames.iter().map(|frame| names.of(*frame)).collect())
+    Ok(frames.iter().map(|frame| names.path(*frame)).collect())
 }
 
 /// The name without its extension, which the files beside it share.

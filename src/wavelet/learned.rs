@@ -33,10 +33,10 @@ impl Learned {
                 rows.extend(orthonormal(candidate, &rows));
             }
         }
-        Self::of_rows(rows, frames)
+        Self::from_rows(rows, frames)
     }
 
-    fn of_rows(rows: Vec<Vec<f64>>, frames: usize) -> Self {
+    fn from_rows(rows: Vec<Vec<f64>>, frames: usize) -> Self {
         let columns = (0..frames).map(|t| rows.iter().map(|row| row[t]).collect()).collect();
         Self { rows, columns, frames }
     }
@@ -97,7 +97,7 @@ impl TimeBasis for Learned {
             return None;
         }
         let rows = self.rows.iter().zip(marked).filter(|(_, marked)| **marked).map(|(row, _)| row.clone());
-        Some(Box::new(Self::of_rows(rows.collect(), self.frames)))
+        Some(Box::new(Self::from_rows(rows.collect(), self.frames)))
     }
 }
 

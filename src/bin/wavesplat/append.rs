@@ -115,7 +115,7 @@ impl AppendArgs {
         let earlier = Earlier::by(self.force, self.resume);
         let (mut out, begun) = open_successor(file, earlier)?;
         let progress = self.common.progress("merge", "windows");
-        let report = shards.merge(Some(begun), false, (file.path(), &mut out), &progress)?;
+        let report = shards.merge(Some(begun), false, file.path(), &mut out, &progress)?;
         file.check_unchanged()?;
         out.commit_if(resume::check)?;
         let (frames, bytes) = (report.frames, report.output_bytes);

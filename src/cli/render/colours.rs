@@ -85,7 +85,7 @@ impl ColourArgs {
     pub(crate) fn clear(&self, ranges: &Ranges, (lo, hi): (f64, f64), common: &CommonArgs) -> Option<Clear> {
         match self.clear {
             ClearSpec::Nothing => None,
-            ClearSpec::Values(pair) => Some(Clear::of_values(pair.0.into(), (lo, hi))),
+            ClearSpec::Values(pair) => Some(Clear::new(pair.0.into(), (lo, hi))),
             // A logarithm is for values near empty space.
             ClearSpec::Auto if self.norm == NormName::Log => None,
             ClearSpec::Auto => {

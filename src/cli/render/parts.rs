@@ -13,7 +13,7 @@ use crate::base::grid::Region;
 use crate::base::output::Output;
 use crate::base::progress::Progress;
 use crate::cli::spare_inputs;
-use crate::file::shard::Standing;
+use crate::file::shard::ShardPlace;
 use crate::file::{CoefficientFile, setting};
 use crate::render::annotate::AxisLabels;
 use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
@@ -172,7 +172,7 @@ impl Cli {
         file: &CoefficientFile,
         (values, axes, exaggeration): (String, [AxisLabels; 3], f64),
     ) -> Result<Planned> {
-        let (standing, m) = (Standing::of(file)?, file.metadata());
+        let (standing, m) = (ShardPlace::from_file(file)?, file.metadata());
         let mut config = self.config_of(scene, Some(file), None, standing.all)?;
         let tolerance = self.tolerance.zip(config.allowed);
         let look = Look {

@@ -303,7 +303,7 @@ impl<'a> PredictionPasses<'a> {
         decoding: impl Fn(usize, usize) -> C,
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
-        let mut rest = Buffer::of(self.pyramid_nodes());
+        let mut rest = Buffer::with_len(self.pyramid_nodes());
         let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
         for (number, nodes) in pyramids.filter(|(_, nodes)| !rows::is_zero(nodes)) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| wanted[*part]) {
@@ -331,7 +331,7 @@ impl<'a> PredictionPasses<'a> {
     }
 
     fn step<R: Real>(&self, step: f64, pass: &Pass) -> R {
-        R::of(self.pyramid.step(step, pass.level))
+        R::from_f64(self.pyramid.step(step, pass.level))
     }
 
     /// The number of nodes in a pyramid.
@@ -346,7 +346,7 @@ impl<'a> PredictionPasses<'a> {
             let step = self.pyramid.step(step, pass.level);
             let first = start;
             start += pass.codes();
-            (first, [R::of(step), R::of(1.0 / step)])
+            (first, [R::from_f64(step), R::from_f64(1.0 / step)])
         };
         self.passes.iter().map(of_pass).collect()
     }

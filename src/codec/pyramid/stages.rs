@@ -134,14 +134,14 @@ impl Stages {
     /// `wanted` marks; others are unspecified.
     pub(super) fn refine<R: Real>(&self, wanted: &[bool], out: &mut [R], correction: &mut impl Correction<R>) {
         let needed = self.needed(wanted);
-        let mut coarse = Buffer::of(self.lattices[0].slice());
+        let mut coarse = Buffer::with_len(self.lattices[0].slice());
         coarse.fill(R::default());
         correction.correct(0, 0, &mut coarse);
         correction.complete(0, 0, &mut coarse);
         let Some((last, others)) = self.stages.split_last() else { return out.copy_from_slice(&coarse) };
         for (stage, needed) in others.iter().zip(&needed) {
             let fine = &self.lattices[stage.ends()[1]];
-            let mut nodes = Buffer::of(fine.slices * fine.slice());
+            let mut nodes = Buffer::with_len(fine.slices * fine.slice());
             self.refine_stage(stage, needed, &coarse, &mut nodes, correction);
             coarse = nodes;
         }
@@ -184,7 +184,7 @@ impl Stages {
         let Some(last) = stage.spatial.clone().last() else { return fine.copy_from_slice(coarse) };
         let mut nodes: Option<Buffer<R>> = None;
         for pass in stage.spatial.start..last {
-            let mut finer = Buffer::of(self.lattices[pass].slice());
+            let mut finer = Buffer::with_len(self.lattices[pass].slice());
             self.refine_pass(pass, n, nodes.as_deref().unwrap_or(coarse), &mut finer, correction);
             nodes = Some(finer);
         }

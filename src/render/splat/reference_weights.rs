@@ -160,7 +160,7 @@ impl<'a> ReferenceWeights<'a> {
         let near = around(centre, std::f64::consts::SQRT_2 * reach / squared.sqrt(), all);
         voxel[self.shear.axes[0]] = near.start;
         let (off, z) = (self.off(voxel, point), self.shear.depth(voxel));
-        self.footprint.sum_of_row(off, z, ([bx, by], self.shear.depths[0]), near.len())
+        self.footprint.sum_of_row(off, z, [bx, by], self.shear.depths[0], near.len())
     }
 
     /// The offset from a point of the picture to a voxel, in pixels.
@@ -193,7 +193,7 @@ mod tests {
         let config = RenderConfig {
             mode: Mode::Projection,
             views: vec![view],
-            kernel: Kernel::of_grid(&grid),
+            kernel: Kernel::for_grid(&grid),
             quantity,
             frames: vec![0],
             paired: false,

@@ -41,8 +41,8 @@ impl<'a, R: Real> BlockValues<'a, R> {
     #[inline(always)]
     pub(super) fn load_row<S: Real>(&self, first: usize, step: usize, row: &mut [S]) {
         let values = &self.values[first..];
-        let number = |value: &R| S::of(value.to_f64());
-        let scaled = |value: &R| S::of((value.to_f64() - self.middle) / self.scale);
+        let number = |value: &R| S::from_f64(value.to_f64());
+        let scaled = |value: &R| S::from_f64((value.to_f64() - self.middle) / self.scale);
         match (self.middle == 0.0 && self.scale == 1.0, step) {
             (true, 1) => row.iter_mut().zip(values).for_each(|(to, value)| *to = number(value)),
             (true, _) => row.iter_mut().zip(values.iter().step_by(step)).for_each(|(to, value)| *to = number(value)),

@@ -216,7 +216,7 @@ impl CellPlane<'_> {
     pub(super) fn add_single(&mut self, rectangle: &Rectangle, sums: &[f32], scale: f32) {
         let own = self.rectangle;
         add_rectangle((&own, self.single()), (rectangle, sums), |to, from| {
-            dispatch!(add_scaled_single(to, from, scale))
+            dispatch!(add_scaled_single(to, from, scale));
         });
     }
 
@@ -224,7 +224,7 @@ impl CellPlane<'_> {
     pub(super) fn add_double<R: Real>(&mut self, rectangle: &Rectangle, sums: &[R], scale: f64) {
         let own = self.rectangle;
         add_rectangle((&own, self.double()), (rectangle, sums), |to, from| {
-            dispatch!(add_scaled_double(to, from, scale))
+            dispatch!(add_scaled_double(to, from, scale));
         });
     }
 }

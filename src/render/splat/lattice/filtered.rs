@@ -141,7 +141,7 @@ fn filter_all_rows(rectangle: &Rectangle, plane: &Rows<'_, f64>, taps: &Taps) ->
 impl<'a, R: Real> Rows<'a, R> {
     /// Puts the cells of all phases of a plane side by side, and filters them along u.
     fn new(rectangle: &Rectangle, number: usize, sums: &'a mut [R], taps: &Taps) -> Self {
-        let (width, taps) = (rectangle.size[0], taps.map(R::of));
+        let (width, taps) = (rectangle.size[0], taps.map(R::from_f64));
         let mut wide = vec![R::default(); width + 2 * HALF];
         let of_row = |row: &mut [R]| {
             interleave(row, rectangle, &mut wide[HALF..][..width]);

@@ -289,7 +289,7 @@ const LAST: usize = 63;
 /// Multiplies a row by its fading.
 #[inline(always)]
 fn fade<S: Real>(row: &mut [S], scale: f64, fading: &[f64]) {
-    row.iter_mut().zip(fading).for_each(|(value, fading)| *value = *value * S::of(scale * fading));
+    row.iter_mut().zip(fading).for_each(|(value, fading)| *value = *value * S::from_f64(scale * fading));
 }
 
 /// A bit for each line of a row that is not zero.
@@ -341,7 +341,7 @@ fn add_rows<S: Real, const Q: usize, const TAPS: usize>(
 fn by_phase<S: Real, const Q: usize, const TAPS: usize>(weights: &Spread) -> [[S; TAPS]; Q] {
     let mut of_phases = [[S::default(); TAPS]; Q];
     for (phase, taps) in of_phases.iter_mut().enumerate() {
-        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = S::of(*weight));
+        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = S::from_f64(*weight));
     }
     of_phases
 }
