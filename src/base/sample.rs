@@ -135,9 +135,13 @@ pub(crate) fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Opt
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut all = Range::<RANGE_LANES>::EMPTY;
     let (many, rest) = values.as_chunks();
-    many.iter().for_each(|values| all.add(values, declared));
+    for values in many {
+        all.add(values, declared);
+    }
     let mut last = Range::<1>::EMPTY;
-    rest.iter().for_each(|v| last.add(&[*v], declared));
+    for v in rest {
+        last.add(&[*v], declared);
+    }
     let (a, b) = (all.whole()?, last.whole()?);
     Some((a.0.min(b.0), a.1.max(b.1)))
 }

@@ -2,6 +2,9 @@
 //!
 //! A kernel is an `#[inline(always)]` function over slices; `dispatch!(kernel(a, b))` calls it compiled for [`level`]. Called
 //! directly, it is compiled for the baseline processor. All levels give the same results.
+//!
+//! Large bodies of loops within kernels are no closures, or `#[inline(always)]` ones: others may stay functions for the baseline
+//! processor.
 
 use std::ffi::OsStr;
 use std::sync::LazyLock;

@@ -216,14 +216,15 @@ impl Block {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
     }
 
-    /// Decodes the codes of one k into `scratch`.
+    /// Decodes the codes of one k, into one of the two vectors.
     pub(crate) fn plane<'a>(
         &'a self,
         codec: &WindowCodec,
         k: usize,
-        scratch: (&'a mut Vec<f32>, &'a mut Vec<f64>),
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
     ) -> Plane<'a> {
-        Plane::decode(codec, self.of, self.step, &self.codes, k, scratch)
+        Plane::decode(codec, self.of, self.step, &self.codes, k, single, double)
     }
 
     /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the

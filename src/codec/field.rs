@@ -55,7 +55,8 @@ impl<'a> Plane<'a> {
         step: f64,
         codes: &Codes,
         k: usize,
-        (single, double): (&'a mut Vec<f32>, &'a mut Vec<f64>),
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
     ) -> Self {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let voxels: usize = codec.decoded_size(size).iter().product();

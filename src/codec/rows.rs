@@ -106,15 +106,25 @@ pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R
     let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
     let (others, last_others) = others.as_chunks::<LANES>();
     for (a, b) in nodes.iter().zip(others) {
-        (0..LANES).for_each(|l| change.add(l, a[l], b[l]));
+        for l in 0..LANES {
+            change.add(l, a[l], b[l]);
+        }
     }
-    last_nodes.iter().zip(last_others).enumerate().for_each(|(l, (a, b))| change.add(l, *a, *b));
+    for (l, (a, b)) in last_nodes.iter().zip(last_others).enumerate() {
+        change.add(l, *a, *b);
+    }
 }
 
 /// Adds the changes from nodes to zeros.
 #[inline(always)]
 pub(super) fn add_changes_to_zero<R: Real>(change: &mut Change, nodes: &[R]) {
     let (nodes, last) = nodes.as_chunks::<LANES>();
-    nodes.iter().for_each(|a| (0..LANES).for_each(|l| change.add(l, a[l], R::default())));
-    last.iter().enumerate().for_each(|(l, a)| change.add(l, *a, R::default()));
+    for a in nodes {
+        for (l, node) in a.iter().enumerate() {
+            change.add(l, *node, R::default());
+        }
+    }
+    for (l, a) in last.iter().enumerate() {
+        change.add(l, *a, R::default());
+    }
 }

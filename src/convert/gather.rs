@@ -299,7 +299,7 @@ impl<'a> WindowReader<'a> {
             return;
         }
         let block = id.block as usize;
-        let (of, all) = (self.plan.sampled_box(&job.codec, block), self.plan.blocks.len());
+        let (of, all) = (self.plan.block_with_ghosts(&job.codec, block), self.plan.blocks.len());
         let missing_value = self.config.missing_value;
         self.findings.variation.add_block((block, all), &of, self.archive.sample, missing_value, samples);
     }
@@ -335,7 +335,7 @@ impl<'a> WindowReader<'a> {
     pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<(BlockId, Vec<u8>)> {
         let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
         let Region { start, .. } = self.plan.blocks.region(block);
-        let known = self.plan.sampled_box(&job.codec, block).known;
+        let known = self.plan.block_with_ghosts(&job.codec, block).known;
         let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
         let mut samples = self.idle.take().unwrap_or_default();
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);

@@ -376,7 +376,7 @@ fn encode_batch(
 ) -> Result<EncodedBatch> {
     let encode = |(id, samples): (BlockId, Vec<u8>)| {
         let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-        let of = plan.sampled_box(&window.codec, id.block as usize);
+        let of = plan.block_with_ghosts(&window.codec, id.block as usize);
         let samples = to_channel(plan.colour_transform, id, samples, read);
         let encoded = encoder.block(&window.codec, id, of, &samples).map_err(bug);
         encoders.put(encoder);

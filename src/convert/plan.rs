@@ -46,7 +46,7 @@ impl<'a> Plan<'a> {
     }
 
     /// A block, with the voxels around it that help to code it.
-    pub(super) fn sampled_box(&self, codec: &WindowCodec, block: usize) -> BlockWithGhosts {
+    pub(super) fn block_with_ghosts(&self, codec: &WindowCodec, block: usize) -> BlockWithGhosts {
         let region = self.blocks.region(block);
         let (start, size) = (region.start, region.dims());
         let outer = codec.outer_size(size);

@@ -106,8 +106,12 @@ impl TimeBasis for Learned {
 fn sums_of_products(factors: &[Vec<f64>], lanes: &[Lane], out: &mut [Lane]) {
     let (some, last) = factors.as_chunks::<SIDE_BY_SIDE>();
     let (some_out, last_out) = out.as_chunks_mut::<SIDE_BY_SIDE>();
-    some_out.iter_mut().zip(some).for_each(|(out, factors)| *out = products(factors, lanes));
-    last_out.iter_mut().zip(last).for_each(|(out, factors)| [*out] = products(std::array::from_ref(factors), lanes));
+    for (out, factors) in some_out.iter_mut().zip(some) {
+        *out = products(factors, lanes);
+    }
+    for (out, factors) in last_out.iter_mut().zip(last) {
+        [*out] = products(std::array::from_ref(factors), lanes);
+    }
 }
 
 #[inline(always)]
