@@ -158,7 +158,7 @@ impl Trial {
         for leaf in self.file.leaves(window) {
             for entry in self.file.leaf(leaf).unwrap() {
                 let places = self.places(&codec, window, entry.id.block);
-                assert!(!self.of_samples() || entry.stats.reached <= codec.promise.delta);
+                assert!(!self.of_samples() || entry.stats.reached <= codec.bound.delta);
                 let block = self.file.block(&codec, &entry, &vec![true; codec.basis.coefficients()]).unwrap();
                 if block.exact.is_some() {
                     assert!(places.iter().all(|i| self.missing[*i] || self.found[*i] == self.source[*i]));

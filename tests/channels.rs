@@ -51,7 +51,7 @@ impl ColouredArchive {
         let paint = |v: &f64| if missing_at(*v) { [0.0; 3] } else { colour(&points, *v) };
         let painted: Vec<[f64; 3]> = samples.iter().map(paint).collect();
         let channels = [0, 1, 2].map(|c| painted.iter().map(|colour| colour[c]).collect());
-        let colours = TransferFunction::of_points(points.to_vec(), ColourSpace::Rgb, None, Some([0.5; 3])).unwrap();
+        let colours = TransferFunction::from_points(points.to_vec(), ColourSpace::Rgb, None, Some([0.5; 3])).unwrap();
         let config = ConvertConfig { colours: Some(colours), ..config };
         Self { memory, config, missing, channels }
     }
@@ -153,7 +153,7 @@ fn a_sampled_bound_holds_for_every_channel_that_is_not_dark() {
     let mut painted = ColouredArchive::new(archive(SKEWED, SampleType::F32, &samples), config);
     let points = vec![(0.0, [0.0, 1.0, 0.0]), (1.0, [1.0, 0.5, 0.0])];
     painted.channels = [0, 1, 2].map(|c| samples.iter().map(|v| colour(&points, f64::from(*v as f32))[c]).collect());
-    painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
+    painted.config.colours = Some(TransferFunction::from_points(points, ColourSpace::Rgb, None, None).unwrap());
     let stored = painted.file();
     assert!(stored.report.delta > 0.0 && stored.report.delta < 0.05 * 0.5, "{}", stored.report.delta);
     painted.check("sampled");
@@ -261,7 +261,7 @@ fn a_looser_tolerance_reads_less_of_colours_and_keeps_to_it() {
     let samples: Vec<f64> = (0..16).flat_map(|t| grid.whole().iter().map(move |voxel| wave(voxel, t))).collect();
     let mut painted = ColouredArchive::new(archive(grid, SampleType::F32, &samples), config);
     let points = vec![(-1.0, [0.0, 0.2, 1.0]), (1.2, [1.0, 0.8, 0.0])]; // a map with steps would allow no omission
-    painted.config.colours = Some(TransferFunction::of_points(points, ColourSpace::Rgb, None, None).unwrap());
+    painted.config.colours = Some(TransferFunction::from_points(points, ColourSpace::Rgb, None, None).unwrap());
     let file = painted.file();
     let plain = looking(view(40.0, 20.0, [60, 50]), 0.0, Quantity::Mean, &grid, 16);
     let (exact, whole) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &plain);

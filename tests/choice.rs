@@ -73,11 +73,11 @@ fn the_chosen_scheme_is_nearly_the_smallest() {
             let (window, codec) = (&file.metadata().windows[0], file.codec(0).unwrap());
             let mut encoder = Encoder::new(3).unwrap();
             let mut coded = |scheme: Scheme| {
-                let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, codec.promise, EDGE);
+                let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, codec.bound, EDGE);
                 let id = BlockId { window: 0, block: 0, channel: 0 };
                 size(&encoder.block(&codec, id, [EDGE; 3], &samples).unwrap().block.parts)
             };
-            let chosen = coded(Scheme::of_window(window));
+            let chosen = coded(Scheme::from_window(window));
             let least = schemes(window.pyramid.as_ref().unwrap()).into_iter().map(&mut coded).min().unwrap();
             assert!(chosen * 100 <= least * 105, "long along {axis}, {tolerance}: {chosen} for {least} bytes");
         }

@@ -21,7 +21,7 @@ const OPACITIES: [(f64, f64); 3] = [(0.0, 0.0), (2.0, 0.3), (3.5, 0.9)];
 const UNIT: f64 = 1.5;
 
 fn transfer() -> TransferFunction {
-    TransferFunction::of_points(COLOURS.to_vec(), ColourSpace::Rgb, Some(OPACITIES.to_vec()), None).unwrap()
+    TransferFunction::from_points(COLOURS.to_vec(), ColourSpace::Rgb, Some(OPACITIES.to_vec()), None).unwrap()
 }
 
 /// The transfer function in the reference's terms.

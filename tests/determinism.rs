@@ -48,9 +48,9 @@ fn threads_change_no_byte_and_no_pixel() {
     }
 }
 
-/// Digests of files, samples and pictures of every scheme. They are the same with every kind of vector code
-/// (`--features portable` has none) and on every machine. They change when the content of files changes (which
-/// includes the versions of the program and of zstd) or when splatting changes, and must then be updated.
+/// Digests of files, samples and pictures of every scheme. They are the same with every kind of vector units
+/// and on every machine. They change when the content of files changes (which includes the versions of the program and of
+/// zstd) or when splatting changes, and must then be updated.
 #[test]
 fn files_and_pictures_are_the_same_on_every_machine() {
     let sample = |i: usize| {
@@ -71,6 +71,16 @@ fn files_and_pictures_are_the_same_on_every_machine() {
         found.extend([xxh3_64(&file.bytes()), xxh3_64(&extracted(&file.open())), digest(of_file)]);
     }
     assert_eq!(found, DIGESTS);
+}
+
+/// Runs the test before in another process, since a process keeps the vector units that it began with.
+#[test]
+fn files_and_pictures_are_the_same_with_the_vector_units_of_every_processor() {
+    let mut tests = Command::new(std::env::current_exe().unwrap());
+    tests.args(["--exact", "determinism::files_and_pictures_are_the_same_on_every_machine"]);
+    let run = tests.env("WAVESPLAT_VECTOR_UNITS", "baseline").output().unwrap();
+    let said = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success() && said.contains("1 passed"), "{said}");
 }
 
 /// Digests of the frames, then for each basis of its file, samples and pictures.

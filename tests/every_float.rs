@@ -63,7 +63,7 @@ fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -
     let reader = Reader::open(file).unwrap();
     let windows = &reader.metadata().windows;
     let of_window = |(number, window): (usize, &wavesplat_format::Window)| {
-        let codec = WindowCodec::of_file(reader.metadata(), window).unwrap();
+        let codec = WindowCodec::from_metadata(reader.metadata(), window).unwrap();
         let leaves = reader.leaves(number as u32).iter();
         let entries: Vec<BlockEntry> = leaves.flat_map(|leaf| reader.leaf(leaf).unwrap()).collect();
         let of_block = |entry: &BlockEntry| {

@@ -107,7 +107,7 @@ fn golden_files_are_packed_anew_with_the_same_samples() {
     let work = tempfile::tempdir().unwrap();
     for (name, digest) in digests() {
         let (old, mut bytes) = (open(&folder().join(format!("{name}.wspl"))), Vec::new());
-        let report = repack(&old, (3, MEMORY), Path::new("new.wspl"), &mut bytes, &Silent).unwrap();
+        let report = repack(&old, 3, MEMORY, Path::new("new.wspl"), &mut bytes, &Silent).unwrap();
         assert_eq!((report.output_bytes, report.frames), (bytes.len() as u64, old.frames() as u64), "{name}");
         let path = work.path().join(format!("{name}.wspl"));
         fs::write(&path, &bytes).unwrap();

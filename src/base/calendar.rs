@@ -58,7 +58,7 @@ impl Calendar {
         let Date { year, month, day } = date;
         if self == Self::Standard {
             let is_lost = LAST_JULIAN < date && date < GREGORIAN;
-            return if is_lost { None } else { self.of_time(date >= GREGORIAN).day(date) };
+            return if is_lost { None } else { self.in_force(date >= GREGORIAN).day(date) };
         }
         let is_date = (1..=12).contains(&month) && (1..=self.month(year, month)).contains(&day);
         let before: i64 = (1..month).map(|month| self.month(year, month)).sum();
@@ -69,7 +69,7 @@ impl Calendar {
     pub(super) fn date(self, day: i64) -> Date {
         if self == Self::Standard {
             let gregorian = Self::ProlepticGregorian;
-            return self.of_time(Some(day) >= gregorian.day(GREGORIAN)).date(day);
+            return self.in_force(Some(day) >= gregorian.day(GREGORIAN)).date(day);
         }
         let (mut left, (years, days)) = (day - self.first(), self.cycle());
         let mut year = 1 + (i128::from(left) * i128::from(years)).div_euclid(days.into()) as i64;
@@ -89,7 +89,7 @@ impl Calendar {
     }
 
     /// The calendar that the standard one is then.
-    fn of_time(self, is_gregorian: bool) -> Self {
+    fn in_force(self, is_gregorian: bool) -> Self {
         if is_gregorian { Self::ProlepticGregorian } else { Self::Julian }
     }
 

@@ -38,7 +38,7 @@ impl Clock {
     /// standard calendar.
     ///
     /// # Errors A message that names the unit or the calendar that is not understood.
-    pub(crate) fn of(unit: &str, calendar: Option<&str>) -> Result<Self, String> {
+    pub(crate) fn parse(unit: &str, calendar: Option<&str>) -> Result<Self, String> {
         let unknown = || format!("the unit {unit:?} is not understood");
         let (name, since) = match unit.split_whitespace().collect::<Vec<_>>()[..] {
             [name] => (name, None),
@@ -195,7 +195,7 @@ mod tests {
     ];
 
     fn clock(unit: &str, calendar: &str) -> Clock {
-        Clock::of(unit, Some(calendar)).expect("a unit")
+        Clock::parse(unit, Some(calendar)).expect("a unit")
     }
 
     #[test]
@@ -287,11 +287,11 @@ mod tests {
             "days since 2000-1-1-1",
             "days since +-2000-1-1",
         ] {
-            let is_known = Clock::of(unit, None).is_ok();
+            let is_known = Clock::parse(unit, None).is_ok();
             assert_eq!(is_known, unit == "days", "{unit}");
         }
         let days = "days since 2000-01-01";
-        assert_eq!(Clock::of(days, Some("lunar")), Err("the calendar \"lunar\" is not known".into()));
+        assert_eq!(Clock::parse(days, Some("lunar")), Err("the calendar \"lunar\" is not known".into()));
         let refused = |from: Clock, to: Clock| from.convert(&mut [1.0], to).expect_err("no times there");
         assert_eq!(refused(clock(days, "noleap"), clock(days, "360_day")), "the calendars differ");
         assert_eq!(refused(clock(days, ""), clock("days", "")), "only one of them counts from a date");

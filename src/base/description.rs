@@ -35,7 +35,7 @@ pub fn narrowed(description: &Description, frames: &[usize], region: &Region, st
             None if axis.role == AxisRole::Frames => frames.to_vec(),
             None => continue,
         };
-        move_first(&mut narrow, description, axis, (items.first().copied().unwrap_or(0), step));
+        move_first(&mut narrow, description, axis, items.first().copied().unwrap_or(0), step);
         narrow.dimensions[axis.dimension as usize].length = items.len() as u64;
         kept[axis.dimension as usize] = Some(items);
     }
@@ -46,7 +46,7 @@ pub fn narrowed(description: &Description, frames: &[usize], region: &Region, st
 }
 
 /// Moves the first voxel to `index` along an axis of the array, and multiplies the step along this axis by `longer`.
-fn move_first(narrow: &mut Description, description: &Description, axis: &ArrayAxis, (index, longer): (usize, usize)) {
+fn move_first(narrow: &mut Description, description: &Description, axis: &ArrayAxis, index: usize, longer: usize) {
     let voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some());
     let (Some(place), Some(orientation)) = (voxels.clone().position(|other| other == axis), &mut narrow.orientation)
     else {

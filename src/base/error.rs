@@ -155,7 +155,7 @@ impl Error {
             | Self::Path { remedy, .. }
             | Self::Input { remedy, .. }
             | Self::Changed { remedy, .. } => remedy.clone(),
-            Self::CoefficientFile { path, source } => of_damage(path, source),
+            Self::CoefficientFile { path, source } => damage_remedy(path, source),
             Self::Io { .. } | Self::Cancelled | Self::Usage(_) | Self::BoundMissed { .. } => None,
         }
     }
@@ -201,7 +201,7 @@ impl Error {
 }
 
 /// What helps against damage of a coefficient file.
-fn of_damage(path: &Path, damage: &wavesplat_format::Error) -> Option<Remedy> {
+fn damage_remedy(path: &Path, damage: &wavesplat_format::Error) -> Option<Remedy> {
     let unfinished = path.extension().is_some_and(|ending| ending == "part");
     match damage {
         wavesplat_format::Error::Corrupt { .. } if unfinished => Some(Remedy::ResumeOrRecover),

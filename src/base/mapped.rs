@@ -52,7 +52,7 @@ impl State {
     /// The state of data that the caller holds: there is no file that could change.
     pub(crate) const HELD: Self = Self { len: 0, modified: None, device: 0, inode: 0, is_file: false };
 
-    fn of(meta: &Metadata) -> Self {
+    fn from_metadata(meta: &Metadata) -> Self {
         let (len, modified, device, inode) = (meta.len(), meta.modified().ok(), meta.dev(), meta.ino());
         Self { len, modified, device, inode, is_file: true }
     }
@@ -74,7 +74,7 @@ impl State {
             return Ok(());
         }
         let now = path.metadata().map_err(|e| Error::io(path, "checking", e))?;
-        self.check(path, &Self::of(&now))
+        self.check(path, &Self::from_metadata(&now))
     }
 }
 
@@ -99,7 +99,7 @@ impl FileBytes {
         if !meta.is_file() {
             return Err(Error::input(path, "not a regular file"));
         }
-        let state = State::of(&meta);
+        let state = State::from_metadata(&meta);
         let map = match access {
             Access::Map if state.len > 0 => {
                 Some(RegisteredMap::new(&file, path).map_err(|e| Error::io(path, "mapping", e))?)

@@ -9,6 +9,7 @@ pub mod cancel;
 pub mod choice;
 pub mod report;
 pub(crate) mod memory;
+pub(crate) mod vectors;
 pub(crate) mod zeroed;
 #[doc(hidden)]
 pub mod text;

@@ -4,6 +4,7 @@
 
 pub use wavesplat_format::SampleType;
 
+use super::vectors::dispatch;
 use crate::base::half::Half;
 
 macro_rules! for_type {
@@ -75,8 +76,12 @@ pub fn round_to(ty: SampleType, value: f64) -> f64 {
 }
 
 /// Writes `values` as little-endian samples of type `ty`, rounded as by [`round_to`].
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
 pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
+    dispatch!(to_bytes(ty, values, out));
+}
+
+#[inline(always)]
+fn to_bytes(ty: SampleType, values: &[f64], out: &mut [u8]) {
     assert_eq!(out.len(), values.len() * ty.size(), "bytes of {} samples", values.len());
     macro_rules! run {
         ($t:ident, $values:expr, $out:expr) => {
@@ -108,7 +113,7 @@ pub fn is_missing(value: f64, declared: Option<f64>) -> bool {
 }
 
 /// Whether any value is missing. It reads all values, so that the loop becomes vector code.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(crate) fn is_any_missing<T: Copy + Into<f64>>(values: &[T], declared: Option<f64>) -> bool {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut any = false;
@@ -125,14 +130,18 @@ pub(crate) fn missing_value(ty: SampleType, declared: Option<f64>) -> Option<f64
 }
 
 /// The range of some values; None if any of them is missing. For long runs: it uses vector code.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(crate) fn range_unless_missing(values: &[f64], declared: Option<f64>) -> Option<(f64, f64)> {
     let declared = declared.unwrap_or(f64::NAN); // equal to nothing
     let mut all = Range::<RANGE_LANES>::EMPTY;
     let (many, rest) = values.as_chunks();
-    many.iter().for_each(|values| all.add(values, declared));
+    for values in many {
+        all.add(values, declared);
+    }
     let mut last = Range::<1>::EMPTY;
-    rest.iter().for_each(|v| last.add(&[*v], declared));
+    for v in rest {
+        last.add(&[*v], declared);
+    }
     let (a, b) = (all.whole()?, last.whole()?);
     Some((a.0.min(b.0), a.1.max(b.1)))
 }
@@ -160,7 +169,7 @@ pub(crate) fn for_each_present(
     mut present: impl FnMut(&[f64], (f64, f64)),
 ) {
     for_each_run(ty, samples, |first, values| {
-        if let Some(run) = range_unless_missing(values, declared) {
+        if let Some(run) = dispatch!(range_unless_missing(values, declared)) {
             present(values, run);
             return;
         }
@@ -329,11 +338,15 @@ mod tests {
         for n in [0, 1, 15, 16, 17, 100] {
             let mut values: Vec<f64> = (0..n).map(value).collect();
             let slow = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (v.min(a), v.max(b)));
-            assert_eq!(range_unless_missing(&values, Some(0.5)), Some(slow));
+            assert_eq!(dispatch!(range_unless_missing(&values[..], Some(0.5))), Some(slow));
             for missing in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.5] {
                 for i in 0..n {
                     let before = std::mem::replace(&mut values[i], missing);
-                    assert_eq!(range_unless_missing(&values, Some(0.5)), None, "{missing} at {i} of {n}");
+                    assert_eq!(
+                        dispatch!(range_unless_missing(&values[..], Some(0.5))),
+                        None,
+                        "{missing} at {i} of {n}"
+                    );
                     values[i] = before;
                 }
             }

@@ -16,7 +16,7 @@ pub fn read(path: &Path, kind: &str) -> Result<String> {
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "reading", e))?;
-    of(bytes, kind).map_err(|what| Error::input(path, what))
+    from_bytes(bytes, kind).map_err(|what| Error::input(path, what))
 }
 
 /// Replaces `%` and two hexadecimal digits by the byte that they stand for. Keeps any other `%`.
@@ -32,7 +32,7 @@ pub(crate) fn percent_decoded(text: &str) -> Vec<u8> {
 }
 
 /// The text of the bytes of a file.
-pub(crate) fn of(bytes: Vec<u8>, kind: &str) -> std::result::Result<String, String> {
+pub(crate) fn from_bytes(bytes: Vec<u8>, kind: &str) -> std::result::Result<String, String> {
     if bytes.len() as u64 > MOST_BYTES {
         return Err(format!("is larger than {} MiB, which no {kind} is", MOST_BYTES >> 20));
     }

@@ -47,8 +47,8 @@ impl TimeLabels {
     /// The times of frames in a unit, perhaps since a date of a calendar; no times if frames are numbered.
     pub fn new(times: Vec<f64>, unit: Option<&str>, calendar: Option<&str>) -> Self {
         let unit = unit.map(str::trim).unwrap_or_default().to_string();
-        let clock = Clock::of(&unit, calendar).ok();
-        let (decimals, dates) = (decimals(&times), clock.and_then(|clock| Dates::of(clock, &times)));
+        let clock = Clock::parse(&unit, calendar).ok();
+        let (decimals, dates) = (decimals(&times), clock.and_then(|clock| Dates::new(clock, &times)));
         Self { times, unit, decimals, dates }
     }
 
@@ -101,7 +101,7 @@ impl TimeLabels {
 
 impl Dates {
     /// None if not all times have a date.
-    fn of(clock: Clock, times: &[f64]) -> Option<Self> {
+    fn new(clock: Clock, times: &[f64]) -> Option<Self> {
         let instants = times.iter().map(|time| clock.instant(*time)).collect::<Option<Vec<_>>>()?;
         let step = instants.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0).min();
         let blur = (largest(times) * f64::EPSILON * clock.unit as f64) as i128;
@@ -111,13 +111,13 @@ impl Dates {
         }
         let all: Vec<i128> = instants.into_iter().map(|instant| rounded(instant, grain)).collect();
         clock.date(*all.iter().min()?).and(clock.date(*all.iter().max()?))?;
-        Some(Self { clock, grain, shown: Shown::of(&all) })
+        Some(Self { clock, grain, shown: Shown::exact(&all) })
     }
 }
 
 impl Shown {
     /// The coarsest format that shows all of these instants exactly.
-    fn of(instants: &[i128]) -> Self {
+    fn exact(instants: &[i128]) -> Self {
         let are = |length: i128| instants.iter().all(|instant| instant % length == 0);
         let least = |decimals: &usize| are(SECOND / 10_i128.pow(*decimals as u32));
         match (are(DAY), are(MINUTE)) {

@@ -258,9 +258,9 @@ mod tests {
     #[test]
     fn errors_of_just_delta_keep_the_root_mean_square() {
         for delta in [0.0, 5e-324, 1e-200, 0.1, 4.0, f64::MAX] {
-            let promise = ErrorBound { bound: Bound::Rms, tolerance: 0.1, delta };
-            assert!(promise.holds([(delta, delta); 3].into_iter()), "{delta}");
-            assert!(!promise.holds([(delta.next_up(), delta); 3].into_iter()), "{delta}");
+            let bound = ErrorBound { bound: Bound::Rms, tolerance: 0.1, delta };
+            assert!(bound.holds([(delta, delta); 3].into_iter()), "{delta}");
+            assert!(!bound.holds([(delta.next_up(), delta); 3].into_iter()), "{delta}");
         }
     }
 
@@ -270,14 +270,14 @@ mod tests {
 
     #[test]
     fn a_relative_bound_is_a_share_of_each_magnitude_or_of_the_floor() {
-        let promise = relative(0.25, 1.0);
-        assert_eq!([-8.0, 2.0, 1.0, 0.5, 0.0].map(|v| promise.allowed(v)), [2.0, 0.5, 0.25, 0.25, 0.25]);
-        assert_eq!(promise.delta, 2.0);
+        let bound = relative(0.25, 1.0);
+        assert_eq!([-8.0, 2.0, 1.0, 0.5, 0.0].map(|v| bound.allowed(v)), [2.0, 0.5, 0.25, 0.25, 0.25]);
+        assert_eq!(bound.delta, 2.0);
         assert_eq!(relative(0.25, 100.0).delta, 25.0);
         assert_eq!(relative(0.25, 0.0).allowed(-0.0), 0.0);
-        assert!(promise.holds([(2.0, 2.0), (0.25, 0.25)].into_iter()));
-        assert!(!promise.holds([(2.0, 2.0), (0.25f64.next_up(), 0.25)].into_iter()));
-        assert!(!promise.holds([(f64::NAN, 2.0)].into_iter()));
+        assert!(bound.holds([(2.0, 2.0), (0.25, 0.25)].into_iter()));
+        assert!(!bound.holds([(2.0, 2.0), (0.25f64.next_up(), 0.25)].into_iter()));
+        assert!(!bound.holds([(f64::NAN, 2.0)].into_iter()));
     }
 
     #[test]
@@ -303,8 +303,8 @@ mod tests {
         ) {
             let unit = 2f64.powi(-53);
             let scale = 2f64.powi(-down);
-            let promise = relative(t as f64 * unit, floor as f64 * scale);
-            let allowed = promise.allowed(v as f64 * scale);
+            let bound = relative(t as f64 * unit, floor as f64 * scale);
+            let allowed = bound.allowed(v as f64 * scale);
             let truth = u128::from(t) * u128::from(v.unsigned_abs().max(floor)); // in units of unit * scale
             let in_units = allowed / scale; // a power of two
             let (whole, rest) = (in_units.floor(), in_units.fract());
@@ -319,13 +319,13 @@ mod tests {
             values in proptest::collection::vec((-1e3..1e3, 0.0..30.0), 1..40), kind in 0..3_usize, floor in 0.0..10.0,
         ) {
             let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor }][kind];
-            let promise = ErrorBound { bound, tolerance: 0.02, delta: 20.0 };
+            let bound = ErrorBound { bound, tolerance: 0.02, delta: 20.0 };
             let mut sums = [0.0];
-            values.iter().for_each(|(v, e)| promise.add(&[*e], &[*v], &mut sums));
-            let fast = promise.largest_share(&sums, values.len());
-            let slow = promise.share(values.iter().map(|(v, e)| (*e, promise.allowed(*v))));
+            values.iter().for_each(|(v, e)| bound.add(&[*e], &[*v], &mut sums));
+            let fast = bound.largest_share(&sums, values.len());
+            let slow = bound.share(values.iter().map(|(v, e)| (*e, bound.allowed(*v))));
             prop_assert!(fast >= slow * (1.0 - 1e-15) && fast <= slow * (1.0 + 1e-11), "{fast} {slow}");
-            prop_assert!(slow > 1.0 || promise.holds(values.iter().map(|(v, e)| (*e, promise.allowed(*v)))));
+            prop_assert!(slow > 1.0 || bound.holds(values.iter().map(|(v, e)| (*e, bound.allowed(*v)))));
         }
     }
 }

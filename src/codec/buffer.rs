@@ -15,7 +15,7 @@ pub struct Buffer<T: Pooled> {
 
 impl<T: Pooled> Buffer<T> {
     /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough, or a new one.
-    pub(crate) fn of(len: usize) -> Self {
+    pub(crate) fn with_len(len: usize) -> Self {
         let mut spare = spare::<T>();
         let fits = (0..spare.len()).filter(|n| spare[*n].len() >= len).min_by_key(|n| spare[*n].len());
         let values = fits.map(|n| spare.swap_remove(n));
@@ -91,13 +91,13 @@ mod tests {
     #[test]
     fn memory_is_used_again_and_grows() {
         let address = |buffer: &Buffer<u64>| buffer.as_ptr();
-        let (small, large) = (Buffer::of(1 << 8), Buffer::of(1 << 12));
+        let (small, large) = (Buffer::with_len(1 << 8), Buffer::with_len(1 << 12));
         let memory = [address(&small), address(&large)];
         drop((small, large));
-        let again = Buffer::of(1 << 10);
+        let again = Buffer::with_len(1 << 10);
         assert_eq!((address(&again), again.len()), (memory[1], 1 << 10));
-        let small = Buffer::of(3);
+        let small = Buffer::with_len(3);
         assert_eq!((address(&small), small.len()), (memory[0], 3));
-        assert_eq!(Buffer::<u64>::of(1 << 14).len(), 1 << 14);
+        assert_eq!(Buffer::<u64>::with_len(1 << 14).len(), 1 << 14);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::WindowCodec;
 use crate::base::sample::{self, SampleType};
+use crate::base::vectors::dispatch;
 use crate::codec::bound::Bound;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::Outliers;
@@ -60,9 +61,9 @@ impl Tally {
     /// vector code that rounds up once at the end. Returns which series were added; the others need a check of each
     /// sample.
     fn add_clearly_within(&mut self, codec: &WindowCodec, compared: &Compared<'_>, count: usize) -> [bool; LANES] {
-        let stats = LaneStats::of(codec, compared);
+        let stats = LaneStats::new(codec, compared);
         std::array::from_fn(|l| {
-            let share = codec.promise.largest_share(&[stats.sums[l]], compared.source.len());
+            let share = codec.bound.largest_share(&[stats.sums[l]], compared.source.len());
             let clear = l < count && share <= 1.0 && !stats.missing[l].is_nan();
             if clear {
                 let largest = if stats.largest[l] > 0.0 { stats.largest[l].next_up() } else { 0.0 };
@@ -87,10 +88,10 @@ impl Tally {
             let (decoded, source) = (compared.decoded[t][lane], compared.source[t][lane]);
             let rounded = sample::round_to(codec.sample, decoded);
             let found = if index(t).is_some() { codec.error(decoded, rounded, source) } else { 0.0 };
-            (found, codec.promise.allowed(source))
+            (found, codec.bound.allowed(source))
         };
         let mut errors: Vec<(f64, f64)> = (0..compared.source.len()).map(error).collect(); // (error, allowed)
-        let holds = codec.promise.holds(errors.iter().copied());
+        let holds = codec.bound.holds(errors.iter().copied());
         for (t, (error, allowed)) in errors.iter_mut().enumerate() {
             let Some(index) = index(t) else { continue };
             if holds || *error <= *allowed {
@@ -101,7 +102,7 @@ impl Tally {
                 self.outliers.push(index as u32);
             }
         }
-        let share = codec.promise.share(errors.iter().copied());
+        let share = codec.bound.share(errors.iter().copied());
         self.share = self.share.max(share.min(1.0)); // rounding up may exceed 1 although the bound holds
     }
 
@@ -130,12 +131,12 @@ struct LaneStats {
 }
 
 impl LaneStats {
-    fn of(codec: &WindowCodec, compared: &Compared<'_>) -> Self {
+    fn new(codec: &WindowCodec, compared: &Compared<'_>) -> Self {
         let mut stats = Self::empty();
         let declared = codec.missing_value.unwrap_or(f64::NAN); // NaN equals no value
-        match (codec.sample, codec.promise.bound) {
-            (SampleType::F32, Bound::Pointwise) => compare_singles(&mut stats, compared, declared),
-            (SampleType::F64, Bound::Pointwise) => compare_doubles(&mut stats, compared, declared),
+        match (codec.sample, codec.bound.bound) {
+            (SampleType::F32, Bound::Pointwise) => dispatch!(compare_singles(&mut stats, compared, declared)),
+            (SampleType::F64, Bound::Pointwise) => dispatch!(compare_doubles(&mut stats, compared, declared)),
             _ => return Self::under_any_bound(codec, compared, declared),
         }
         stats.sums = stats.largest;
@@ -147,7 +148,7 @@ impl LaneStats {
         let mut stats = Self::empty();
         for (decoded, source) in compared.decoded.iter().zip(compared.source) {
             let errors = stats.add(decoded, &sample::round_all(codec.sample, decoded), source, declared);
-            codec.promise.add(&errors, source, &mut stats.sums);
+            codec.bound.add(&errors, source, &mut stats.sums);
         }
         stats
     }
@@ -176,7 +177,7 @@ impl LaneStats {
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
@@ -184,7 +185,7 @@ fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
     for (decoded, source) in compared.decoded.iter().zip(compared.source) {
         stats.add(decoded, decoded, source, declared);
@@ -204,14 +205,14 @@ mod tests {
         let lanes = |first: usize| (0..40).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();
         let (source, mut decoded): (Vec<Lane>, Vec<Lane>) = (lanes(0), lanes(5));
         (decoded[3][1], decoded[9][4], decoded[20][6]) = (f64::NAN, -9.5, f64::INFINITY);
-        let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 3.0 };
+        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 3.0 };
         for ty in [SampleType::F32, SampleType::F64] {
-            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), 40, ty, promise, 8);
+            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), 40, ty, bound, 8);
             codec.missing_value = Some(-9.5);
             let compared = Compared { source: &source, decoded: &decoded };
             let bit = |v: f64| if v.is_nan() { u64::MAX } else { v.to_bits() };
             let bits = |s: LaneStats| [s.lo, s.hi, s.missing, s.largest, s.squares, s.sums].map(|lane| lane.map(bit));
-            let (fast, slow) = (LaneStats::of(&codec, &compared), LaneStats::under_any_bound(&codec, &compared, -9.5));
+            let (fast, slow) = (LaneStats::new(&codec, &compared), LaneStats::under_any_bound(&codec, &compared, -9.5));
             assert!([1, 4, 6].into_iter().all(|l| fast.missing[l].is_nan()));
             assert_eq!(bits(fast), bits(slow), "{ty}");
         }

@@ -26,7 +26,8 @@ pub(crate) fn thinned<S: Storage>(
     codec: &WindowCodec,
     entry: &BlockEntry,
     size: [usize; 3],
-    (stride, frames): (usize, &[usize]),
+    stride: usize,
+    frames: &[usize],
 ) -> Result<Vec<f32>> {
     let [x, y, z] = codec.decoded_size(size);
     let step = stride >> codec.lod;

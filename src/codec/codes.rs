@@ -1,7 +1,8 @@
 //! The codes of a block in memory.
 
 use super::buffer::Buffer;
-use super::rows;
+use super::rows::count_nonzero;
+use crate::base::vectors::dispatch;
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 use wavesplat_format::SparseCodes;
@@ -75,7 +76,7 @@ impl Codes {
 
     /// The number of codes that are not zero.
     pub(crate) fn nonzero(&self) -> usize {
-        rows::count_nonzero(self.dense()) + self.sparse().count()
+        dispatch!(count_nonzero(self.dense())) + self.sparse().count()
     }
 }
 

@@ -76,14 +76,14 @@ impl Block {
     }
 
     /// A block with these codes, as [`Self::all_codes`] returns them.
-    pub fn of_codes(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
-        let mut block = Self { missing: Default::default(), step, ..Self::of_missing(codec, size) };
+    pub fn from_codes(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
+        let mut block = Self { missing: Default::default(), step, ..Self::missing(codec, size) };
         block.set_codes(codec, codes);
         block
     }
 
     /// A block with every sample missing: NaN for float types, else the declared value, or 0 without one.
-    pub(crate) fn of_missing(codec: &WindowCodec, of: [usize; 3]) -> Self {
+    pub(crate) fn missing(codec: &WindowCodec, of: [usize; 3]) -> Self {
         let size = codec.decoded_size(of);
         let voxels: usize = size.iter().product();
         let samples = codec.frames() * voxels;
@@ -126,7 +126,7 @@ impl Block {
         needed: impl Fn(u8) -> bool,
     ) -> Result<Buffer<i32>> {
         let all: usize = self.of.iter().product();
-        let mut codes = Buffer::of(codec.basis.coefficients() * all);
+        let mut codes = Buffer::with_len(codec.basis.coefficients() * all);
         for level in 0..codec.parts() as u8 {
             let range = codec.level_range(level, self.of);
             if needed(level) {
@@ -208,7 +208,7 @@ impl Block {
     pub(crate) fn field_at_once(&self, codec: &WindowCodec, wanted: &[bool]) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
-        at_once.then(|| Field::refined(codec, self.of, self.step, (self.codes.sparse(), wanted)))
+        at_once.then(|| Field::refined(codec, self.of, self.step, self.codes.sparse(), wanted))
     }
 
     /// Whether any sample is stored exactly, and overrides the coefficients.
@@ -216,14 +216,15 @@ impl Block {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
     }
 
-    /// Decodes the codes of one k into `scratch`.
+    /// Decodes the codes of one k, into one of the two vectors.
     pub(crate) fn plane<'a>(
         &'a self,
         codec: &WindowCodec,
         k: usize,
-        scratch: (&'a mut Vec<f32>, &'a mut Vec<f64>),
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
     ) -> Plane<'a> {
-        Plane::decode(codec, self.of, self.step, (&self.codes, k), scratch)
+        Plane::decode(codec, self.of, self.step, &self.codes, k, single, double)
     }
 
     /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the
@@ -272,7 +273,7 @@ impl Block {
 
     /// Samples in the case that nodes are samples and already have the sample type.
     fn stored_singles(&self, codec: &WindowCodec, values: &[f32]) -> Buffer<u8> {
-        let mut out = Buffer::of(4 * values.len());
+        let mut out = Buffer::with_len(4 * values.len());
         for (bytes, value) in out.as_chunks_mut().0.iter_mut().zip(values) {
             *bytes = value.to_le_bytes();
         }
@@ -283,7 +284,7 @@ impl Block {
 
     /// As [`Self::samples`], with the values that are splatted, which are not rounded to the sample type.
     pub(crate) fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
-        let mut values = Buffer::of(codec.frames() * self.voxels);
+        let mut values = Buffer::with_len(codec.frames() * self.voxels);
         let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
         if self.exact.is_some() {
             sample::load(codec.sample, &samples, &mut values);
@@ -298,7 +299,7 @@ impl Block {
     /// Decodes all samples; `visit(index of the first, values)` gets values before they are rounded.
     fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Buffer<u8> {
         let size = codec.sample.size();
-        let mut out = Buffer::of(codec.frames() * self.voxels * size);
+        let mut out = Buffer::with_len(codec.frames() * self.voxels * size);
         match &self.exact {
             Some(exact) => out.copy_from_slice(exact),
             None => {

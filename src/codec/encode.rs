@@ -11,12 +11,12 @@
 //! So the bound holds for any finite input and any basis, and includes rounding and quantisation errors. Missing
 //! samples are stored without loss: a mask, and their own bytes.
 
+use super::block_with_ghosts::BlockWithGhosts;
 use super::buffer::clear;
 use super::check::Tally;
 use super::error_weights::QuantizerSetup;
 use super::load::{Missing, load_group};
 use super::refine::{Coded, Source};
-use super::sampled_box::SampledBox;
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
@@ -55,10 +55,10 @@ impl Encoder {
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
-        of: impl Into<SampledBox>,
+        of: impl Into<BlockWithGhosts>,
         samples: &[u8],
     ) -> wavesplat_format::Result<Encoded> {
-        let of: SampledBox = of.into();
+        let of: BlockWithGhosts = of.into();
         let (size, around) = (of.size, codec.outer_size(of.size));
         let (own, outer) = (of.own(codec, samples), of.extended(codec, around, samples));
         let samples = &own[..];
@@ -96,7 +96,7 @@ impl Encoder {
     fn series(&mut self, block: &Source<'_>) -> Option<Coded> {
         let &Source { codec, samples, missing, .. } = block;
         let voxels = block.voxels();
-        let weighing = QuantizerSetup::of(codec, samples, missing.magnitude)?;
+        let weighing = QuantizerSetup::new(codec, samples, missing.magnitude)?;
         let step = weighing.step;
         clear(&mut self.codes).resize(codec.basis.coefficients() * voxels, 0);
         let mut group = Group::new(codec);
@@ -108,7 +108,7 @@ impl Encoder {
             }
             group.truncate(codec, step);
             dropped += self.keep_codes(&group, step, voxels, first, count);
-            block.check(&group, (first, count), &mut tally)?;
+            block.check(&group, first, count, &mut tally)?;
         }
         Some(Coded { step, parts: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
     }

@@ -15,7 +15,7 @@ use crate::wavelet::{LANES, Lane};
 /// The error weights and the quantisation step of a block.
 #[derive(Debug)]
 pub(super) struct QuantizerSetup {
-    promise: ErrorBound,
+    bound: ErrorBound,
     sample: SampleType,
     /// Samples below this magnitude get its weight. Few of them then miss a relative bound, and those are stored
     /// exactly.
@@ -29,29 +29,29 @@ pub(super) struct QuantizerSetup {
 impl QuantizerSetup {
     /// The setup for a block whose largest sample is `magnitude`. None if no error is allowed, so that the block must
     /// be stored exactly.
-    pub(super) fn of(codec: &WindowCodec, samples: &[u8], magnitude: f64) -> Option<Self> {
-        let found = match codec.promise.bound {
+    pub(super) fn new(codec: &WindowCodec, samples: &[u8], magnitude: f64) -> Option<Self> {
+        let found = match codec.bound.bound {
             Bound::Relative { floor } => Self::relative(codec, magnitude, floor.max(usual_magnitude(codec, samples))),
             _ => Self::same(codec, magnitude),
         };
-        (codec.promise.delta > 0.0 && found.step.is_normal()).then_some(found)
+        (codec.bound.delta > 0.0 && found.step.is_normal()).then_some(found)
     }
 
     /// The setup for an error bound that is the same for all samples.
     fn same(codec: &WindowCodec, magnitude: f64) -> Self {
-        let error = bound::before_rounding(codec.sample, codec.promise.delta, magnitude);
-        let step = codec.promise.step(error.max(0.0), codec.gain);
-        Self { promise: codec.promise, sample: codec.sample, floor: 0.0, common: Some(reciprocal(error)), step }
+        let error = bound::before_rounding(codec.sample, codec.bound.delta, magnitude);
+        let step = codec.bound.step(error.max(0.0), codec.gain);
+        Self { bound: codec.bound, sample: codec.sample, floor: 0.0, common: Some(reciprocal(error)), step }
     }
 
     /// The setup for a relative bound. The step suits all but the smallest samples, as far as 32-bit codes of the
     /// largest permit.
     fn relative(codec: &WindowCodec, magnitude: f64, floor: f64) -> Self {
-        let mut found = Self { promise: codec.promise, sample: codec.sample, floor, common: None, step: 1.0 };
+        let mut found = Self { bound: codec.bound, sample: codec.sample, floor, common: None, step: 1.0 };
         let smallest = found.error(0.0);
         if smallest > 0.0 {
             let finest = magnitude * (codec.basis.coefficients() as f64).sqrt() * FINEST;
-            found.step = codec.promise.step(smallest, codec.gain).max(finest);
+            found.step = codec.bound.step(smallest, codec.gain).max(finest);
         } else if magnitude > 0.0 {
             found.step = 0.0; // the sample type is too coarse for the bound
         }
@@ -71,7 +71,7 @@ impl QuantizerSetup {
     /// The error allowed to a sample under a relative bound before rounding to the sample type; 0 or less if none.
     fn error(&self, value: f64) -> f64 {
         let magnitude = value.abs().max(self.floor);
-        bound::before_rounding(self.sample, self.promise.tolerance * magnitude, magnitude)
+        bound::before_rounding(self.sample, self.bound.tolerance * magnitude, magnitude)
     }
 }
 

@@ -6,6 +6,7 @@ use super::codes::Codes;
 use super::pyramid::PredictionPasses;
 use super::real::Real;
 use super::rows::{self, Change};
+use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
 use wavesplat_format::{Pyramid, SparseCodes};
 
@@ -52,8 +53,10 @@ impl<'a> Plane<'a> {
         codec: &WindowCodec,
         size: [usize; 3],
         step: f64,
-        (codes, k): (&Codes, usize),
-        (single, double): (&'a mut Vec<f32>, &'a mut Vec<f64>),
+        codes: &Codes,
+        k: usize,
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
     ) -> Self {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let voxels: usize = codec.decoded_size(size).iter().product();
@@ -72,7 +75,7 @@ impl<'a> Plane<'a> {
             return Self::Zero;
         }
         scratch.resize(codes.len(), 0.0);
-        scale(step, codes, scratch);
+        dispatch!(scale(step, codes, &mut scratch[..]));
         Self::Double(scratch)
     }
 }
@@ -83,13 +86,14 @@ impl Field<'static> {
         codec: &WindowCodec,
         size: [usize; 3],
         step: f64,
-        (codes, wanted): (&SparseCodes, &[bool]),
+        codes: &SparseCodes,
+        wanted: &[bool],
     ) -> Self {
         let (values, marked) = match &codec.scheme.pyramid {
             Some(pyramid) if pyramid.single => {
-                refined(&codec.passes(pyramid, size), step, (codes, wanted), Values::Single)
+                refined(&codec.passes(pyramid, size), step, codes, wanted, Values::Single)
             }
-            Some(pyramid) => refined(&codec.passes(pyramid, size), step, (codes, wanted), Values::Double),
+            Some(pyramid) => refined(&codec.passes(pyramid, size), step, codes, wanted, Values::Double),
             None => (Values::Zero, vec![false; codec.basis.coefficients()]),
         };
         Self { values, marked }
@@ -104,7 +108,7 @@ impl<'a> Field<'a> {
                 let marked = vec![true; codec.basis.coefficients()];
                 Self { values: Values::Codes { step, codes }, marked }
             }
-            _ => Field::refined(codec, size, step, (codes.sparse(), &vec![true; codec.basis.coefficients()])),
+            _ => Field::refined(codec, size, step, codes.sparse(), &vec![true; codec.basis.coefficients()]),
         }
     }
 
@@ -136,20 +140,20 @@ impl<'a> Field<'a> {
     fn load(&self, first: usize, out: &mut [f64]) {
         match &self.values {
             Values::Zero => out.fill(0.0),
-            Values::Codes { step, codes } => scale(*step, &codes[first..], out),
-            Values::Single(values) => widen(&values[first..], out),
+            Values::Codes { step, codes } => dispatch!(scale(*step, &codes[first..], out)),
+            Values::Single(values) => dispatch!(widen(&values[first..], out)),
             Values::Double(values) => out.copy_from_slice(&values[first..first + out.len()]),
         }
     }
 
     /// Calls `visit(index of the first, values)` for all decoded samples, a run of voxels at a time.
     pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
-        let used = Used::of(basis, &self.marked);
+        let used = Used::new(basis, &self.marked);
         let basis = used.basis(basis);
         let mut run = Run::new(basis, &used.ks);
         for first in (0..voxels).step_by(RUN) {
             let count = RUN.min(voxels - first);
-            run.load(self, voxels, (first, count));
+            run.load(self, voxels, first, count);
             run.invert(basis, count.div_ceil(LANES));
             (0..basis.frames()).for_each(|frame| visit(frame * voxels + first, &run.frame(frame)[..count]));
         }
@@ -195,7 +199,7 @@ pub(super) struct Used {
 
 impl Used {
     /// Creates it from marks. All coefficients of unmarked k must be zero.
-    pub(super) fn of(basis: &dyn TimeBasis, marked: &[bool]) -> Self {
+    pub(super) fn new(basis: &dyn TimeBasis, marked: &[bool]) -> Self {
         let basis = basis.only(marked);
         let ks = (0..marked.len()).filter(|k| basis.is_none() || marked[*k]).collect();
         Self { ks, basis }
@@ -227,7 +231,7 @@ impl<'a> Run<'a> {
         Self { coefficients: lanes(ks.len()), series: lanes(basis.frames()), row: [0.0; RUN], ks }
     }
 
-    fn load(&mut self, field: &Field<'_>, voxels: usize, (first, count): (usize, usize)) {
+    fn load(&mut self, field: &Field<'_>, voxels: usize, first: usize, count: usize) {
         for (i, k) in self.ks.iter().enumerate() {
             field.load(k * voxels + first, &mut self.row[..count]);
             let of_k = self.coefficients[i..].iter_mut().step_by(self.ks.len());
@@ -250,12 +254,12 @@ impl<'a> Run<'a> {
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn scale(step: f64, codes: &[i32], out: &mut [f64]) {
     out.iter_mut().zip(codes).for_each(|(v, code)| *v = f64::from(*code) * step);
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn widen(values: &[f32], out: &mut [f64]) {
     out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
 }
@@ -263,13 +267,14 @@ fn widen(values: &[f32], out: &mut [f64]) {
 fn refined<'a, R: Real>(
     passes: &PredictionPasses<'_>,
     step: f64,
-    (codes, wanted): (&SparseCodes, &[bool]),
+    codes: &SparseCodes,
+    wanted: &[bool],
     values: fn(Buffer<R>) -> Values<'a>,
 ) -> (Values<'a>, Vec<bool>) {
     if codes.count() == 0 {
         return (Values::Zero, vec![false; passes.nodes()[3]]);
     }
-    let mut field = Buffer::of(passes.nodes().iter().product());
+    let mut field = Buffer::with_len(passes.nodes().iter().product());
     let marked = passes.decode_some(wanted, step, codes, &mut field);
     (values(field), marked)
 }

@@ -46,7 +46,7 @@ pub(super) fn load_group(
     group: &mut Group,
 ) {
     let voxels = missing.mask.len() / codec.frames();
-    load_lanes(codec, samples, (first, count), voxels, &mut group.source);
+    load_lanes(codec, samples, first, count, voxels, &mut group.source);
     if let (Some(weight), 0, LANES) = (weighing.common(), missing.count, count) {
         return group.weight.fill([weight; LANES]);
     }
@@ -60,7 +60,7 @@ pub(super) fn load_group(
 }
 
 /// Loads the samples of `count` of `voxels` voxels, frame by frame; unused lanes are zero.
-fn load_lanes(codec: &WindowCodec, samples: &[u8], (first, count): (usize, usize), voxels: usize, out: &mut [Lane]) {
+fn load_lanes(codec: &WindowCodec, samples: &[u8], first: usize, count: usize, voxels: usize, out: &mut [Lane]) {
     let size = codec.sample.size();
     if count == LANES {
         return sample::load_strided(codec.sample, &samples[first * size..], voxels, out);

@@ -21,7 +21,7 @@ pub(crate) mod real;
 mod refine;
 mod repack;
 mod rows;
-pub(crate) mod sampled_box;
+pub(crate) mod block_with_ghosts;
 pub(crate) mod scheme;
 pub(crate) mod trial;
 mod truncate;
@@ -48,7 +48,7 @@ pub struct WindowCodec {
     /// The type of the samples.
     pub sample: SampleType,
     /// The guaranteed error bound.
-    pub promise: ErrorBound,
+    pub bound: ErrorBound,
     /// The sample value that means "missing", besides NaN and infinities.
     pub missing_value: Option<f64>,
     /// If set, extracted samples are clamped to this range, the range of the source's samples in the window.
@@ -61,28 +61,28 @@ pub struct WindowCodec {
 
 impl WindowCodec {
     /// Creates the codec of a window of `frames` frames. Blocks have at most `edge` voxels a side.
-    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, promise: ErrorBound, edge: usize) -> Self {
+    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, bound: ErrorBound, edge: usize) -> Self {
         let basis = scheme.time_basis(frames);
         let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), edge) };
-        Self::with_levels(scheme, basis, sample, promise, &levels)
+        Self::with_levels(scheme, basis, sample, bound, &levels)
     }
 
     fn with_levels(
         scheme: Scheme,
         basis: Box<dyn TimeBasis>,
         sample: SampleType,
-        promise: ErrorBound,
+        bound: ErrorBound,
         levels: &[usize],
     ) -> Self {
         let synthesis = wavelet::synthesis(basis.as_ref());
         let gain = wavelet::gain(&synthesis);
         let levels = wavelet::ranges(levels);
-        Self { scheme, basis, synthesis, gain, sample, promise, missing_value: None, clip: None, levels, lod: 0 }
+        Self { scheme, basis, synthesis, gain, sample, bound, missing_value: None, clip: None, levels, lod: 0 }
     }
 
     /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.
-    pub fn of_file(file: &Metadata, window: &Window) -> std::result::Result<Self, wavesplat_format::Error> {
-        let scheme = Scheme::of_window(window);
+    pub fn from_metadata(file: &Metadata, window: &Window) -> std::result::Result<Self, wavesplat_format::Error> {
+        let scheme = Scheme::from_window(window);
         let basis = scheme.time_basis(window.frames as usize);
         if basis.coefficients() != window.coefficients as usize {
             let what =
@@ -90,8 +90,8 @@ impl WindowCodec {
             return Err(wavesplat_format::Error::Invalid(what));
         }
         let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
-        let promise = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
-        let codec = Self::with_levels(scheme, basis, file.sample, promise, &levels);
+        let bound = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
+        let codec = Self::with_levels(scheme, basis, file.sample, bound, &levels);
         let clip = Some((window.min, window.max)).filter(|(lo, hi)| lo <= hi && is_clipped(file));
         Ok(Self { missing_value: file.missing_value, clip, ..codec })
     }

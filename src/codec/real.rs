@@ -17,10 +17,10 @@ pub(crate) trait Real:
     const BIG: Self;
 
     /// Rounds to the type.
-    fn of(x: f64) -> Self;
+    fn from_f64(x: f64) -> Self;
 
     /// Converts a code.
-    fn of_code(code: i32) -> Self;
+    fn from_code(code: i32) -> Self;
 
     /// Converts exactly.
     fn to_f64(self) -> f64;
@@ -38,11 +38,11 @@ impl Real for f32 {
     const LARGEST: f64 = f32::MAX as f64 / 4096.0;
     const BIG: Self = 12_582_912.0;
 
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         x as Self
     }
 
-    fn of_code(code: i32) -> Self {
+    fn from_code(code: i32) -> Self {
         code as Self
     }
 
@@ -64,11 +64,11 @@ impl Real for f64 {
     const LARGEST: f64 = f64::MAX / 4096.0;
     const BIG: Self = 6_755_399_441_055_744.0;
 
-    fn of(x: f64) -> Self {
+    fn from_f64(x: f64) -> Self {
         x
     }
 
-    fn of_code(code: i32) -> Self {
+    fn from_code(code: i32) -> Self {
         code.into()
     }
 

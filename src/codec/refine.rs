@@ -71,14 +71,14 @@ impl Source<'_> {
         [source, field, split]: &mut [Vec<R>; 3],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
-        let weighing = QuantizerSetup::of(self.codec, self.samples, self.missing.magnitude)?;
+        let weighing = QuantizerSetup::new(self.codec, self.samples, self.missing.magnitude)?;
         let mut step = self.step::<R>(pyramid, &weighing)?;
         outer.load(&weighing, source);
         let passes = self.codec.passes(pyramid, self.size);
         codes.resize(passes.codes(), 0);
         field.resize(passes.nodes().iter().product(), R::default());
         let mut encode = |step| {
-            let fits = passes.encode(step, (source, outer.size), (field, split), codes);
+            let fits = passes.encode(step, source, outer.size, field, split, codes);
             fits.then(|| self.checked(&weighing, &passes, field, codes))
         };
         let mut checked = encode(step)?;
@@ -121,7 +121,7 @@ impl Source<'_> {
 
     /// Whether the pyramid codes samples directly, and the bound applies to each sample by itself.
     fn plain(&self) -> bool {
-        self.codec.scheme.basis == Basis::Samples && self.codec.promise.measure() == Measure::Largest
+        self.codec.scheme.basis == Basis::Samples && self.codec.bound.measure() == Measure::Largest
     }
 
     /// Loads the nodes that the pyramid refines.
@@ -136,10 +136,10 @@ impl Source<'_> {
 
     /// Loads the samples as nodes; missing samples become NaN.
     fn load_samples<R: Real>(&self, field: &mut [R]) {
-        sample::load_as(self.codec.sample, self.samples, field, R::of);
+        sample::load_as(self.codec.sample, self.samples, field, R::from_f64);
         if self.missing.count > 0 {
             let missing = field.iter_mut().zip(&self.missing.mask).filter(|(_, missing)| **missing);
-            missing.for_each(|(node, _)| *node = R::of(f64::NAN));
+            missing.for_each(|(node, _)| *node = R::from_f64(f64::NAN));
         }
     }
 
@@ -153,8 +153,8 @@ impl Source<'_> {
             for (k, lane) in group.coefficients.iter().enumerate() {
                 let nodes = &mut field[k * voxels + first..][..count];
                 match nodes.first_chunk_mut::<LANES>() {
-                    Some(nodes) => *nodes = lane.map(R::of),
-                    None => nodes.iter_mut().zip(lane).for_each(|(node, c)| *node = R::of(*c)),
+                    Some(nodes) => *nodes = lane.map(R::from_f64),
+                    None => nodes.iter_mut().zip(lane).for_each(|(node, c)| *node = R::from_f64(*c)),
                 }
             }
         }
@@ -191,11 +191,11 @@ impl Source<'_> {
 
     /// Compares series with the decoded field. None if too many samples miss the bound.
     fn check_series<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> Option<Tally> {
-        let used = Used::of(self.codec.basis.as_ref(), marked);
+        let used = Used::new(self.codec.basis.as_ref(), marked);
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()) {
-            self.decode_group(weighing, (field, &used), (first, count), &mut group);
-            self.check(&group, (first, count), &mut tally)?;
+            self.decode_group(weighing, field, &used, first, count, &mut group);
+            self.check(&group, first, count, &mut tally)?;
         }
         Some(tally)
     }
@@ -204,8 +204,10 @@ impl Source<'_> {
     fn decode_group<R: Real>(
         &self,
         weighing: &QuantizerSetup,
-        (field, used): (&[R], &Used),
-        (first, count): (usize, usize),
+        field: &[R],
+        used: &Used,
+        first: usize,
+        count: usize,
         group: &mut Group,
     ) {
         let (codec, voxels) = (self.codec, self.voxels());
@@ -226,22 +228,22 @@ impl Source<'_> {
         if self.plain() && self.codec.scheme.coarseness <= 1.0 {
             return 0;
         }
-        let used = Used::of(self.codec.basis.as_ref(), marked);
+        let used = Used::new(self.codec.basis.as_ref(), marked);
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
         for (first, count) in lane_groups(self.voxels()).step_by(SAMPLING) {
-            self.decode_group(weighing, (field, &used), (first, count), &mut group);
-            self.add(&group, (first, count), &mut tally);
+            self.decode_group(weighing, field, &used, first, count, &mut group);
+            self.add(&group, first, count, &mut tally);
         }
         tally.outliers.len() * SAMPLING
     }
 
     /// Compares a group's decoded series with the source. None if too many samples have missed the bound so far.
-    pub(super) fn check(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) -> Option<()> {
-        self.add(group, (first, count), tally);
+    pub(super) fn check(&self, group: &Group, first: usize, count: usize, tally: &mut Tally) -> Option<()> {
+        self.add(group, first, count, tally);
         self.outliers_affordable(tally.outliers.len()).then_some(())
     }
 
-    fn add(&self, group: &Group, (first, count): (usize, usize), tally: &mut Tally) {
+    fn add(&self, group: &Group, first: usize, count: usize, tally: &mut Tally) {
         let compared = Compared { source: &group.source, decoded: &group.decoded };
         let sample_index = |t: usize, lane: usize| self.sample_index(t * self.voxels() + first + lane);
         tally.add_series(self.codec, &compared, count, self.missing.count == 0, sample_index);

@@ -15,7 +15,8 @@ impl Encoder {
     pub(crate) fn repack<S: Storage>(
         &mut self,
         reader: &Reader<S>,
-        (from, to): (&WindowCodec, &WindowCodec),
+        from: &WindowCodec,
+        to: &WindowCodec,
         size: [usize; 3],
         entry: &BlockEntry,
     ) -> Result<EncodedBlock> {
@@ -29,7 +30,7 @@ impl Encoder {
             && entry.parts.iter().any(|part| is_packed_anew(part.kind))
         {
             let block = Block::read(reader, from, entry, size, &vec![true; from.basis.coefficients()])?;
-            parts.extend(self.level_parts((to, pyramid), size, block.step, &block.all_codes(from))?);
+            parts.extend(self.level_parts(to, pyramid, size, block.step, &block.all_codes(from))?);
         }
         parts.sort_by_key(|part| part.kind);
         Ok(EncodedBlock { id: entry.id, stats: entry.stats, parts })
@@ -38,7 +39,8 @@ impl Encoder {
     /// The level parts of a pyramid, from all codes.
     fn level_parts(
         &mut self,
-        (codec, pyramid): (&WindowCodec, &Pyramid),
+        codec: &WindowCodec,
+        pyramid: &Pyramid,
         size: [usize; 3],
         step: f64,
         codes: &[i32],
@@ -46,7 +48,7 @@ impl Encoder {
         let passes = codec.passes(pyramid, size);
         let listed = passes.list(codes);
         let all = vec![true; codec.basis.coefficients()];
-        let changes = Field::refined(codec, size, step, (&listed, &all)).changes(&passes, step, &listed);
+        let changes = Field::refined(codec, size, step, &listed, &all).changes(&passes, step, &listed);
         let mut parts = Vec::new();
         for (part, change) in (0..).zip(&changes) {
             let count = passes.count(part, &listed);

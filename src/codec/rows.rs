@@ -58,7 +58,7 @@ pub(super) fn all_zero(codes: &[i32]) -> bool {
 }
 
 /// The number of codes that are not zero.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn count_nonzero(codes: &[i32]) -> usize {
     let of_run = |run: &[i32]| run.iter().map(|code| u32::from(*code != 0)).sum::<u32>() as usize;
     codes.chunks(1 << 16).map(of_run).sum()
@@ -101,20 +101,30 @@ impl Change {
 }
 
 /// Adds the changes from `nodes` to `others`.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn add_changes<R: Real>(change: &mut Change, nodes: &[R], others: &[R]) {
     let (nodes, last_nodes) = nodes.as_chunks::<LANES>();
     let (others, last_others) = others.as_chunks::<LANES>();
     for (a, b) in nodes.iter().zip(others) {
-        (0..LANES).for_each(|l| change.add(l, a[l], b[l]));
+        for l in 0..LANES {
+            change.add(l, a[l], b[l]);
+        }
     }
-    last_nodes.iter().zip(last_others).enumerate().for_each(|(l, (a, b))| change.add(l, *a, *b));
+    for (l, (a, b)) in last_nodes.iter().zip(last_others).enumerate() {
+        change.add(l, *a, *b);
+    }
 }
 
 /// Adds the changes from nodes to zeros.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn add_changes_to_zero<R: Real>(change: &mut Change, nodes: &[R]) {
     let (nodes, last) = nodes.as_chunks::<LANES>();
-    nodes.iter().for_each(|a| (0..LANES).for_each(|l| change.add(l, a[l], R::default())));
-    last.iter().enumerate().for_each(|(l, a)| change.add(l, *a, R::default()));
+    for a in nodes {
+        for (l, node) in a.iter().enumerate() {
+            change.add(l, *node, R::default());
+        }
+    }
+    for (l, a) in last.iter().enumerate() {
+        change.add(l, *a, R::default());
+    }
 }

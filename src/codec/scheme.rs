@@ -24,7 +24,7 @@ impl Scheme {
     }
 
     /// The scheme of a window of a file.
-    pub fn of_window(window: &Window) -> Self {
+    pub fn from_window(window: &Window) -> Self {
         let (functions, pyramid) = (window.functions.clone(), window.pyramid.clone());
         Self { basis: window.basis, functions, pyramid, coarseness: window.coarseness }
     }

@@ -1,11 +1,11 @@
 //! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
 
 use super::WindowCodec;
+use super::block_with_ghosts::BlockWithGhosts;
 use super::error_weights::QuantizerSetup;
 use super::load::Missing;
 use super::real::Real;
 use super::refine::Source;
-use super::sampled_box::SampledBox;
 use std::borrow::Cow;
 use wavesplat_format::Pyramid;
 
@@ -31,12 +31,12 @@ pub(crate) struct Scratch<R> {
 
 impl<'a, R: Real> Trial<'a, R> {
     /// Pyramids may use the nodes of `outer` voxels.
-    pub(crate) fn new(codec: &WindowCodec, (of, outer): (SampledBox, [usize; 3]), samples: &'a [u8]) -> Self {
+    pub(crate) fn new(codec: &WindowCodec, of: BlockWithGhosts, outer: [usize; 3], samples: &'a [u8]) -> Self {
         let size = of.size;
         let (own, extended) = (of.own(codec, samples), of.extended(codec, outer, samples));
         let around = Missing::find(codec, &extended);
         let missing = Missing::find(codec, &own);
-        let weighing = QuantizerSetup::of(codec, &own, missing.magnitude);
+        let weighing = QuantizerSetup::new(codec, &own, missing.magnitude);
         let mut nodes = Vec::new();
         if let Some(weighing) = &weighing {
             Source { codec, size: outer, samples: &extended, missing: &around }.load(weighing, &mut nodes);
@@ -68,7 +68,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         field.resize(passes.nodes().iter().product(), R::default());
         codes.resize(passes.codes(), 0);
-        if !passes.encode(step, (&self.nodes, self.outer), (field, split), codes) {
+        if !passes.encode(step, &self.nodes, self.outer, field, split, codes) {
             return None;
         }
         let outliers = source.estimate_outliers(weighing, field, &passes.marked_codes(codes));
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn estimates_are_close_to_what_is_stored() {
         let (samples, xyzt) = (samples(), [Axis::X, Axis::Y, Axis::Z, Axis::T]);
-        let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
+        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
         for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyzt[..3]), (Basis::Samples, 1.0, &xyzt[..])] {
             let (order, stencil) = (order.to_vec(), Stencil::Cubic);
             let pyramid = Pyramid {
@@ -122,12 +122,12 @@ mod tests {
                 ghosts: true,
             };
             let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
-            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, promise, 32);
+            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 32);
             let mut encoder = Encoder::new(3).expect("a usual level");
             let id = BlockId { window: 0, block: 0, channel: 0 };
             let encoded = encoder.block(&codec, id, SIZE, &samples).expect("a small block");
             let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
-            let trial = Trial::<f32>::new(&codec, (SIZE.into(), codec.outer_size(SIZE)), &samples);
+            let trial = Trial::<f32>::new(&codec, SIZE.into(), codec.outer_size(SIZE), &samples);
             let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());
             assert!(estimate.abs_diff(stored) * 20 < stored, "{basis:?}: {estimate} for {stored}");
         }

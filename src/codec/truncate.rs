@@ -18,6 +18,7 @@
 
 use super::WindowCodec;
 use super::real::Real;
+use crate::base::vectors::dispatch;
 use crate::codec::bound::Measure;
 use crate::wavelet::{LANES, Lane};
 
@@ -62,7 +63,7 @@ impl Group {
     /// Transforms and quantises the source. False if a code does not fit; the block must then be stored exactly.
     pub(super) fn quantise(&mut self, codec: &WindowCodec, step: f64) -> bool {
         codec.basis.forward(&self.source, &mut self.coefficients);
-        quantise(&self.coefficients, step, &mut self.codes)
+        dispatch!(quantise(&self.coefficients[..], step, &mut self.codes[..]))
     }
 
     /// The kept codes of coefficient k; 0 for lanes that drop it.
@@ -79,7 +80,7 @@ impl Group {
         self.dropped = counts; // first try to keep none
         loop {
             self.reconstruct(codec, step);
-            let errors = self.errors(codec.promise.measure());
+            let errors = self.errors(codec.bound.measure());
             for l in 0..LANES {
                 let end = if errors[l] <= 1.0 { &mut holds[l] } else { &mut fails[l] };
                 *end = self.dropped[l];
@@ -118,13 +119,13 @@ impl Group {
     }
 
     fn reconstruct(&mut self, codec: &WindowCodec, step: f64) {
-        decode_kept((&self.codes, &self.rank), &self.dropped, step, &mut self.work);
+        dispatch!(decode_kept(&self.codes[..], &self.rank[..], &self.dropped, step, &mut self.work[..]));
         codec.basis.inverse(&mut self.work, &mut self.decoded);
     }
 
     /// The weighted error of each lane: the largest over the frames, or the root mean square.
     fn errors(&self, measure: Measure) -> Lane {
-        let errors = errors(&self.decoded, &self.source, &self.weight);
+        let errors = dispatch!(errors(&self.decoded[..], &self.source[..], &self.weight[..]));
         match measure {
             Measure::Largest => errors.largest,
             Measure::RootMeanSquare => errors.squares.map(|sum| (sum / self.source.len() as f64).sqrt()),
@@ -133,7 +134,7 @@ impl Group {
 }
 
 /// Quantises coefficients to codes. False if a code does not fit.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn quantise(coefficients: &[Lane], step: f64, codes: &mut [[i32; LANES]]) -> bool {
     let mut fits = true;
     for (codes, coefficients) in codes.iter_mut().zip(coefficients) {
@@ -155,7 +156,7 @@ const NONE: i64 = i64::MAX;
 /// Ranks the sort keys of each lane.
 fn rank(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
     if sizes.len() <= MOST_COMPARED {
-        return rank_by_comparing(sizes, rank);
+        return dispatch!(rank_by_comparing(sizes, rank));
     }
     for l in 0..LANES {
         let mut order: Vec<(i64, usize)> = sizes.iter().map(|(k, sizes)| (sizes[l], *k)).collect();
@@ -168,7 +169,7 @@ fn rank(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
 const MOST_COMPARED: usize = 64;
 
 /// Ranks by comparing all pairs: quadratic, but vector code.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]]) {
     for (k, size) in sizes {
         let mut smaller = [0_i64; LANES];
@@ -182,8 +183,8 @@ fn rank_by_comparing(sizes: &[(usize, [i64; LANES])], rank: &mut [[i32; LANES]])
 }
 
 /// Decodes the kept coefficients; zero in lanes that drop one.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
-fn decode_kept((codes, rank): (&[[i32; LANES]], &[[i32; LANES]]), dropped: &[i32; LANES], step: f64, out: &mut [Lane]) {
+#[inline(always)]
+fn decode_kept(codes: &[[i32; LANES]], rank: &[[i32; LANES]], dropped: &[i32; LANES], step: f64, out: &mut [Lane]) {
     for ((out, codes), rank) in out.iter_mut().zip(codes).zip(rank) {
         for l in 0..LANES {
             let keep = -i32::from(rank[l] >= dropped[l]); // all bits, or none
@@ -198,7 +199,7 @@ struct Errors {
     squares: Lane,
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn errors(decoded: &[Lane], source: &[Lane], weight: &[Lane]) -> Errors {
     let mut errors = Errors { largest: Lane::default(), squares: Lane::default() };
     for ((decoded, source), weight) in decoded.iter().zip(source).zip(weight) {

@@ -119,7 +119,7 @@ mod tests {
     proptest! {
         #[test]
         fn no_bytes_make_a_reader_panic(bytes in texts()) {
-            let Ok(text) = text::of(bytes, KIND) else { return Ok(()) };
+            let Ok(text) = text::from_bytes(bytes, KIND) else { return Ok(()) };
             for map in [paraview::parse(&text, None), table::parse(&text)].into_iter().flatten() {
                 let (lo, hi) = map.range();
                 prop_assert!(lo < hi);
@@ -128,7 +128,7 @@ mod tests {
                     prop_assert!(colour.iter().all(|c| (0.0..=1.0).contains(c)), "{colour:?}");
                     prop_assert!((0.0..=1.0).contains(&map.opacity(value)));
                 }
-                prop_assert_eq!(TransferFunction::of_text(&map.text()).map(|m| m.text()), Some(map.text()));
+                prop_assert_eq!(TransferFunction::parse(&map.text()).map(|m| m.text()), Some(map.text()));
             }
         }
 
@@ -141,9 +141,9 @@ mod tests {
             use crate::colour::{Colour, ColourSpace};
             points.sort_by(|a: &(f64, Colour), b| a.0.total_cmp(&b.0));
             let spaces = [ColourSpace::Rgb, ColourSpace::Hsv, ColourSpace::HsvWrapped, ColourSpace::Lab, ColourSpace::Diverging, ColourSpace::Step];
-            let map = TransferFunction::of_points(points, spaces[space], None, None).map_err(TestCaseError::reject)?;
+            let map = TransferFunction::from_points(points, spaces[space], None, None).map_err(TestCaseError::reject)?;
             for map in [map.over((-3.3, 7.7)).expect("a range"), map] {
-                let again = TransferFunction::of_text(&map.text()).expect("the same");
+                let again = TransferFunction::parse(&map.text()).expect("the same");
                 prop_assert_eq!(&again, &map);
                 prop_assert_eq!(again.colour(value), map.colour(value));
             }

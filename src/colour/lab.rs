@@ -6,7 +6,7 @@ use super::Colour;
 const WHITE: [f64; 3] = [0.9505, 1.0, 1.089];
 
 /// Converts to L* (0 to 100), a* and b*.
-pub(super) fn of_rgb(colour: Colour) -> [f64; 3] {
+pub(super) fn from_rgb(colour: Colour) -> [f64; 3] {
     let [r, g, b] = colour.map(linear);
     let xyz = [
         0.4124 * r + 0.3576 * g + 0.1805 * b,

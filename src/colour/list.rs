@@ -15,7 +15,7 @@ pub(super) fn parse(list: &str) -> Result<TransferFunction, String> {
     let colours = list.split(',').map(colour).collect::<Result<Vec<_>, _>>()?;
     let last = (colours.len() - 1) as f64;
     let points = colours.into_iter().enumerate().map(|(n, colour)| (n as f64 / last, colour)).collect();
-    let map = TransferFunction::of_points(points, ColourSpace::Rgb, None, None)?;
+    let map = TransferFunction::from_points(points, ColourSpace::Rgb, None, None)?;
     Ok(TransferFunction { of_values: false, ..map })
 }
 

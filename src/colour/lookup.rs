@@ -99,7 +99,7 @@ mod tests {
         }
         let points = vec![(0.0, [0.1, 0.5, 1.0]), (0.3, [0.1, 0.1, 0.1]), (0.3, [0.9, 0.2, 0.7]), (1.0, [0.3; 3])];
         for space in [ColourSpace::Rgb, ColourSpace::Step] {
-            let map = TransferFunction::of_points(points.clone(), space, None, None).expect("a map");
+            let map = TransferFunction::from_points(points.clone(), space, None, None).expect("a map");
             is_exact(&map); // 0.1, 0.3 and 0.5 lie between two levels, so few colours are looked up
         }
     }
@@ -108,7 +108,7 @@ mod tests {
     fn jumps_between_steps_are_exact() {
         let grey = |points: &[(f64, f64)]| {
             let points = points.iter().map(|(share, level)| (*share, [*level; 3])).collect();
-            is_exact(&TransferFunction::of_points(points, ColourSpace::Rgb, None, None).expect("a map"));
+            is_exact(&TransferFunction::from_points(points, ColourSpace::Rgb, None, None).expect("a map"));
         };
         grey(&[(0.0, 0.2), (0.49995, 0.2), (0.5, 0.9), (0.5, 0.2), (1.0, 0.2)]);
         grey(&[(0.0, 0.0), (0.25, 64.502 / 255.0), (0.25, 64.2 / 255.0), (1.0, 1.0), (1.0, 0.3)]);
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn slow_maps_are_exact_up_to_rounding() {
         let points = vec![(0.0, [0.2, 0.3, 0.8]), (1.0, [0.7, 0.0, 0.1])];
-        let map = TransferFunction::of_points(points, ColourSpace::Diverging, None, None).expect("two points");
+        let map = TransferFunction::from_points(points, ColourSpace::Diverging, None, None).expect("two points");
         let lookup = Lookup::new(&map);
         for share in (0..=9999).map(|i| f64::from(i) / 9999.0) {
             let exact = bytes(map.colour(share).expect("a colour"));

@@ -85,7 +85,7 @@ impl TransferFunction {
     /// # Errors
     /// Fewer than two points, values that do not ascend or are all equal, values that are not finite, or colours and
     /// opacities outside 0 to 1. The message is worded to follow the name of the file.
-    pub fn of_points(
+    pub fn from_points(
         points: Vec<(f64, Colour)>,
         space: ColourSpace,
         opacity: Option<Vec<(f64, f64)>>,
@@ -136,7 +136,7 @@ impl TransferFunction {
     /// The same colours with other opacities: points (share of the range, opacity).
     ///
     /// # Errors
-    /// The same as for [`Self::of_points`].
+    /// The same as for [`Self::from_points`].
     pub fn with_opacity(&self, at_shares: &[(f64, f64)]) -> std::result::Result<Self, String> {
         check_points("opacities", at_shares.iter().map(|(v, a)| (*v, std::slice::from_ref(a))))?;
         if let Some((share, _)) = at_shares.iter().find(|(share, _)| !(0.0..=1.0).contains(share)) {
@@ -247,7 +247,7 @@ impl TransferFunction {
         }
     }
 
-    /// The colours as text. [`Self::of_text`] restores them exactly.
+    /// The colours as text. [`Self::parse`] restores them exactly.
     pub(crate) fn text(&self) -> String {
         match &self.colours {
             Colours::Named(named) => format!("{} {:?} {:?}", named.name, self.range.0, self.range.1),
@@ -260,7 +260,7 @@ impl TransferFunction {
     }
 
     /// Restores the colours from [`Self::text`]; `None` for any other text.
-    pub(crate) fn of_text(text: &str) -> Option<Self> {
+    pub(crate) fn parse(text: &str) -> Option<Self> {
         let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().ok()).collect::<Option<Vec<f64>>>();
         let Some((space, points)) = text.split_once(';') else {
             let (name, range) = text.split_once(' ')?;
@@ -269,7 +269,7 @@ impl TransferFunction {
         };
         let point = |text: &str| numbers(text)?.try_into().ok().map(|[v, r, g, b]: [f64; 4]| (v, [r, g, b]));
         let points = points.split(';').map(point).collect::<Option<Vec<_>>>()?;
-        Self::of_points(points, ColourSpace::named(space)?, None, None).ok()
+        Self::from_points(points, ColourSpace::named(space)?, None, None).ok()
     }
 }
 

@@ -74,7 +74,7 @@ fn transfer_function(map: &Map) -> Result<TransferFunction, String> {
     let opacities = opacities.transpose()?.map(bends).transpose()?;
     let nan = map.nan.as_ref().map(|nan| <Colour>::try_from(nan.as_slice()));
     let nan = nan.transpose().map_err(|_| "has a NanColor that is not 3 numbers")?;
-    TransferFunction::of_points(points.collect(), space(map)?, opacities, nan)
+    TransferFunction::from_points(points.collect(), space(map)?, opacities, nan)
 }
 
 /// Numbers in groups of four.

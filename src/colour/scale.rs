@@ -16,7 +16,7 @@ pub enum Norm {
 
 impl Norm {
     /// The number whose differences are spread evenly.
-    fn of(self, value: f64) -> f64 {
+    fn spread(self, value: f64) -> f64 {
         if self == Self::Log { libm::log(value.max(f64::MIN_POSITIVE)) } else { value }
     }
 }
@@ -45,16 +45,16 @@ const SIDE: f64 = 0.1;
 
 impl Clear {
     /// The values from `lo` to `hi`, for colours over `range`.
-    pub fn of_values((lo, hi): (f64, f64), range: (f64, f64)) -> Self {
+    pub fn new((lo, hi): (f64, f64), range: (f64, f64)) -> Self {
         Self { lo, hi, fade: FADE * (range.1 - range.0) }
     }
 
     /// The values of empty space, and how common they are, if many of the pixels have such a value.
-    pub fn of_empty(pixels: &Distribution, (lo, hi): (f64, f64)) -> Option<(Self, Common)> {
+    pub fn empty_space(pixels: &Distribution, (lo, hi): (f64, f64)) -> Option<(Self, Common)> {
         let empty = pixels.empty((lo, hi))?;
         let (side, near) = (SIDE * (hi - lo), NEAR * (hi - lo));
         let is_between = empty.value - lo > side && hi - empty.value > side;
-        let clear = Self::of_values((empty.value - near, empty.value + near), (lo, hi));
+        let clear = Self::new((empty.value - near, empty.value + near), (lo, hi));
         Some((clear, empty)).filter(|_| empty.share > EMPTY_SHARES[usize::from(is_between)])
     }
 
@@ -103,7 +103,7 @@ impl Scale {
             return Err(Error::setting("norm", Note::with(what, Remedy::RangeAboveZero)));
         }
         let map = map.over((0.0, 1.0))?;
-        let normed = (norm.of(lo), norm.of(hi));
+        let normed = (norm.spread(lo), norm.spread(hi));
         Ok(Self { lookup: Lookup::new(&map), map, range, normed, norm, background, clear: None })
     }
 
@@ -207,7 +207,7 @@ impl Scale {
     /// The position of a value in the range, 0 to 1; 0 for NaN.
     pub(crate) fn share(&self, value: impl Into<f64>) -> f64 {
         let (lo, hi) = self.normed;
-        let t = (self.norm.of(value.into()) - lo) / (hi - lo);
+        let t = (self.norm.spread(value.into()) - lo) / (hi - lo);
         if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) }
     }
 
@@ -292,7 +292,7 @@ mod tests {
         let of = |value: f32, count: usize| {
             let mut values: Vec<f32> = (0..=100).map(|n| n as f32 / 50.0 - 1.0).collect();
             values.extend(vec![value; count]);
-            Clear::of_empty(&Distribution::new(values), (-1.0, 1.0)).map(|(clear, _)| clear.lo < clear.hi)
+            Clear::empty_space(&Distribution::new(values), (-1.0, 1.0)).map(|(clear, _)| clear.lo < clear.hi)
         };
         assert_eq!([of(-1.0, 20), of(-1.0, 60), of(0.0, 60), of(0.0, 300)], [None, Some(true), None, Some(true)]);
     }

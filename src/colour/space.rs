@@ -45,10 +45,10 @@ impl ColourSpace {
     pub(super) fn between(self, a: Colour, b: Colour, t: f64) -> Colour {
         let colour = match self {
             Self::Rgb => mix(a, b, t),
-            Self::Hsv => of_hsv(mix(hsv(a), hsv(b), t)),
-            Self::HsvWrapped => of_hsv(mix_wrapped(hsv(a), hsv(b), t)),
-            Self::Lab => lab::to_rgb(mix(lab::of_rgb(a), lab::of_rgb(b), t)),
-            Self::Diverging => diverging(polar(lab::of_rgb(a)), polar(lab::of_rgb(b)), t),
+            Self::Hsv => from_hsv(mix(hsv(a), hsv(b), t)),
+            Self::HsvWrapped => from_hsv(mix_wrapped(hsv(a), hsv(b), t)),
+            Self::Lab => lab::to_rgb(mix(lab::from_rgb(a), lab::from_rgb(b), t)),
+            Self::Diverging => diverging(polar(lab::from_rgb(a)), polar(lab::from_rgb(b)), t),
             Self::Step if t > 0.0 => b,
             Self::Step => a,
         };
@@ -77,7 +77,7 @@ fn hsv([r, g, b]: Colour) -> [f64; 3] {
     [sixths.rem_euclid(6.0) / 6.0, chroma / value, value]
 }
 
-fn of_hsv([hue, saturation, value]: [f64; 3]) -> Colour {
+fn from_hsv([hue, saturation, value]: [f64; 3]) -> Colour {
     let channel = |sixth: f64| {
         let angle = (sixth + hue * 6.0).rem_euclid(6.0);
         value - value * saturation * angle.min(4.0 - angle).clamp(0.0, 1.0)
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn lab_mixes_by_lightness() {
         near(ColourSpace::Lab.between([0.0; 3], [1.0; 3], 0.5), [0.4663; 3], 1e-3); // L* = 50
-        near(lab::of_rgb([1.0, 0.0, 0.0]), [53.24, 80.09, 67.20], 0.05);
+        near(lab::from_rgb([1.0, 0.0, 0.0]), [53.24, 80.09, 67.20], 0.05);
     }
 
     #[test]

@@ -44,14 +44,14 @@ pub(super) fn parse(text: &str) -> Result<TransferFunction, String> {
 
 fn transfer_function(rows: &[Row]) -> Result<TransferFunction, String> {
     let in_bytes = rows.iter().flat_map(|row| row.colour).any(|c| c > 1.0);
-    let colours = rows.iter().map(|row| Ok((row.value, if in_bytes { of_bytes(row)? } else { row.colour })));
+    let colours = rows.iter().map(|row| Ok((row.value, if in_bytes { from_bytes(row)? } else { row.colour })));
     let colours = colours.collect::<Result<Vec<_>, String>>()?;
     let opacities: Vec<_> = rows.iter().filter_map(|row| row.opacity.map(|a| (row.value, a))).collect();
-    TransferFunction::of_points(colours, ColourSpace::Rgb, (!opacities.is_empty()).then_some(opacities), None)
+    TransferFunction::from_points(colours, ColourSpace::Rgb, (!opacities.is_empty()).then_some(opacities), None)
 }
 
 /// The colour of a line in a table with colours of 0 to 255.
-fn of_bytes(row: &Row) -> Result<Colour, String> {
+fn from_bytes(row: &Row) -> Result<Colour, String> {
     let wrong = |c: &&f64| !(0.0..=255.0).contains(*c) || c.fract() != 0.0;
     match row.colour.iter().find(wrong) {
         None => Ok(row.colour.map(|c| c / 255.0)),

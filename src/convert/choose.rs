@@ -14,9 +14,9 @@ use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::base::spread::evenly;
 use crate::codec::WindowCodec;
+use crate::codec::block_with_ghosts::BlockWithGhosts;
 use crate::codec::bound::{ErrorBound, Measure};
 use crate::codec::real::Real;
-use crate::codec::sampled_box::SampledBox;
 use crate::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use crate::codec::trial::{Scratch, Trial};
 use crate::source::{Archive, FrameWindow, read_frames};
@@ -90,7 +90,7 @@ pub(super) struct SchemeSelector<'a> {
 
 /// A box of samples, frame by frame.
 struct Sampled {
-    size: SampledBox,
+    size: BlockWithGhosts,
     /// The voxels that pyramids may use.
     outer: [usize; 3],
     samples: Vec<u8>,
@@ -160,7 +160,7 @@ impl SchemeSelector<'_> {
         for scheme in schemes {
             if found.iter().all(|f| f.basis != scheme.basis) {
                 let codec = self.codec(scheme);
-                let trial = |b: &'a Sampled| Trial::new(&codec, (b.size, b.outer), &b.samples);
+                let trial = |b: &'a Sampled| Trial::new(&codec, b.size, b.outer, &b.samples);
                 found.push(Transformed { basis: scheme.basis, boxes: boxes.par_iter().map(trial).collect() });
             }
         }
@@ -232,7 +232,7 @@ impl SchemeSelector<'_> {
         let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
         let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
-        let size = SampledBox { size, known };
+        let size = BlockWithGhosts { size, known };
         let window = self.channels[number % self.channels.len()];
         let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
         Ok(Sampled { size, outer, samples })

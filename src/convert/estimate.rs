@@ -12,9 +12,9 @@ use crate::base::output::STANDARD;
 use crate::base::progress::Progress;
 use crate::base::sample::{self, join_ranges};
 use crate::base::spread::evenly;
+use crate::codec::block_with_ghosts::BlockWithGhosts;
 use crate::codec::bound::range_bound;
 use crate::codec::encode::Encoded;
-use crate::codec::sampled_box::SampledBox;
 use crate::source::scan::{Scan, scan_frame};
 use crate::source::{Archive, FrameSource, FrameWindow, read_frames_into};
 use serde::Serialize;
@@ -174,7 +174,7 @@ impl FramesRead<'_> {
         for (number, block) in self.blocks.iter().enumerate() {
             let (region, ty) = (self.plan.blocks.region(*block), self.archive.sample);
             read_frames_into(window, 0..window.frames(), &region, ty, &mut samples)?;
-            let extent = SampledBox { size: region.dims(), known: region.dims() };
+            let extent = BlockWithGhosts { size: region.dims(), known: region.dims() };
             variation.add_block(number, self.blocks.len(), &extent, ty, self.missing_value, &samples);
             for (range, frame) in ranges.iter_mut().zip(samples.chunks_exact(region.voxels() * ty.size())) {
                 *range = join_ranges(*range, sample::range_of_present(ty, frame, self.missing_value, |_| {}));

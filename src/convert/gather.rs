@@ -159,7 +159,7 @@ impl<'a> WindowReader<'a> {
     /// Takes over a window's record as if the window had just been coded.
     fn continue_after(&mut self, window: &Window) {
         self.range = Some(window.range).filter(|range| range.0 <= range.1 && self.config.range.is_none());
-        self.scheme = Some(Scheme::of_window(window));
+        self.scheme = Some(Scheme::from_window(window));
         self.frames += u64::from(window.frames);
     }
 
@@ -302,7 +302,7 @@ impl<'a> WindowReader<'a> {
             return;
         }
         let (block, all) = (read.id.block as usize, self.plan.blocks.len());
-        let (extent, ty) = (self.plan.sampled_box(&job.codec, block), self.archive.sample);
+        let (extent, ty) = (self.plan.block_with_ghosts(&job.codec, block), self.archive.sample);
         self.findings.variation.add_block(block, all, &extent, ty, self.config.missing_value, &read.samples);
     }
 
@@ -337,7 +337,7 @@ impl<'a> WindowReader<'a> {
     pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<BlockSamples> {
         let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
         let Region { start, .. } = self.plan.blocks.region(block);
-        let known = self.plan.sampled_box(&job.codec, block).known;
+        let known = self.plan.block_with_ghosts(&job.codec, block).known;
         let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
         let mut samples = self.idle.take().unwrap_or_default();
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);

@@ -384,7 +384,7 @@ fn encode_batch(
 ) -> Result<EncodedBatch> {
     let encode = |BlockSamples { id, samples }| {
         let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-        let extent = plan.sampled_box(&window.codec, id.block as usize);
+        let extent = plan.block_with_ghosts(&window.codec, id.block as usize);
         let samples = to_channel(plan.colour_transform, id, samples, read);
         let encoded = encoder.block(&window.codec, id, extent, &samples).map_err(bug);
         encoders.put(encoder);

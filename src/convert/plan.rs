@@ -6,8 +6,8 @@ use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::BlockGrid;
 use crate::base::memory;
 use crate::codec::WindowCodec;
+use crate::codec::block_with_ghosts::BlockWithGhosts;
 use crate::codec::bound::Bound;
-use crate::codec::sampled_box::SampledBox;
 use crate::file::promise::UNIT_RANGE;
 use crate::source::{CHANNELS, ColourTransform};
 use crate::wavelet;
@@ -47,11 +47,14 @@ impl<'a> Plan<'a> {
     }
 
     /// A block, with the voxels around it that help to code it.
-    pub(super) fn sampled_box(&self, codec: &WindowCodec, block: usize) -> SampledBox {
+    pub(super) fn block_with_ghosts(&self, codec: &WindowCodec, block: usize) -> BlockWithGhosts {
         let region = self.blocks.region(block);
         let (start, size) = (region.start, region.dims());
         let outer = codec.outer_size(size);
-        SampledBox { size, known: std::array::from_fn(|a| (start[a] + outer[a]).min(self.blocks.dims[a]) - start[a]) }
+        BlockWithGhosts {
+            size,
+            known: std::array::from_fn(|a| (start[a] + outer[a]).min(self.blocks.dims[a]) - start[a]),
+        }
     }
 
     pub(super) fn new(input: &'a CodedInput) -> Result<Self> {

@@ -194,7 +194,7 @@ fn number<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Option<f64>
 /// Reads colours from the text that files keep.
 fn colours<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Option<TransferFunction>, D::Error> {
     let Some(text) = Option::<String>::deserialize(from)? else { return Ok(None) };
-    TransferFunction::of_text(&text).map(Some).ok_or_else(|| D::Error::custom(format!("no colours: {text}")))
+    TransferFunction::parse(&text).map(Some).ok_or_else(|| D::Error::custom(format!("no colours: {text}")))
 }
 
 #[cfg(test)]

@@ -51,7 +51,7 @@ impl ConvertConfig {
             None => None,
         };
         let colours = match named("colours") {
-            Some(colours) => Some(TransferFunction::of_text(colours)?),
+            Some(colours) => Some(TransferFunction::parse(colours)?),
             None => None,
         };
         let missing_value = match named("missing-value") {

@@ -2,7 +2,7 @@
 
 use crate::base::sample::{self, SampleType};
 use crate::base::spread::evenly;
-use crate::codec::sampled_box::SampledBox;
+use crate::codec::block_with_ghosts::BlockWithGhosts;
 
 /// Approximate number of voxels sampled per window.
 const VOXELS: usize = 4096;
@@ -25,7 +25,7 @@ impl Variation {
         &mut self,
         block: usize,
         blocks: usize,
-        extent: &SampledBox,
+        extent: &BlockWithGhosts,
         ty: SampleType,
         declared: Option<f64>,
         samples: &[u8],
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn voxels_of_a_block_are_read_at_their_places() {
-        let extent = SampledBox { size: [2, 2, 2], known: [3, 2, 2] };
+        let extent = BlockWithGhosts { size: [2, 2, 2], known: [3, 2, 2] };
         let frame = |t: u32| (0..12_u32).map(move |i| if i % 3 == 2 { t * 1000 } else { t * 4 } as f32);
         let bytes: Vec<u8> = (0..2).flat_map(frame).flat_map(f32::to_le_bytes).collect();
         let mut found = Variation::default();

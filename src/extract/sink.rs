@@ -37,7 +37,7 @@ impl Files {
             }
             OutputFiles::List { extension, .. } => {
                 let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, extension));
-                (frames.iter().map(|frame| folder.join(names.of(*frame))).collect(), Some(path.into()))
+                (frames.iter().map(|frame| folder.join(names.path(*frame))).collect(), Some(path.into()))
             }
             OutputFiles::WithHeader { extension, .. } => {
                 stem(path)?;
@@ -80,7 +80,7 @@ fn numbered(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Vec<P
         ));
     }
     let names = Numbered::new(path, frames.len())?;
-    Ok(frames.iter().map(|frame| names.of(*frame)).collect())
+    Ok(frames.iter().map(|frame| names.path(*frame)).collect())
 }
 
 /// The name without its extension, which the files beside it share.

@@ -61,7 +61,7 @@ impl Damage {
         Some(format!("{} damaged blocks were left out; the first: {first}", met.len()))
     }
 
-    fn of_window(&self, window: u32) -> bool {
+    fn is_in_window(&self, window: u32) -> bool {
         let first = BlockId { window, block: 0, channel: 0 };
         self.blocks.range(first..).next().is_some_and(|(id, _)| id.window == window)
     }
@@ -267,7 +267,8 @@ impl CoefficientFile {
 
     /// As [`Self::codec`], for all voxels.
     fn codec_of_all(&self, window: u32) -> Result<WindowCodec> {
-        WindowCodec::of_file(self.metadata(), &self.metadata().windows[window as usize]).map_err(|e| self.failed(e))
+        WindowCodec::from_metadata(self.metadata(), &self.metadata().windows[window as usize])
+            .map_err(|e| self.failed(e))
     }
 
     /// The directory's leaves of a window, of all channels.
@@ -336,7 +337,7 @@ impl CoefficientFile {
     /// Whether any sample of a window may be missing.
     pub(crate) fn has_missing(&self, window: u32) -> bool {
         let record = &self.metadata().windows[window as usize];
-        record.missing > 0 || self.skipped().is_some_and(|damage| damage.of_window(window))
+        record.missing > 0 || self.skipped().is_some_and(|damage| damage.is_in_window(window))
     }
 
     /// The entries of a leaf's blocks.
@@ -389,7 +390,7 @@ impl CoefficientFile {
         let size = self.all_voxels(entry)?;
         if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
             skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
-            return Ok(Block::of_missing(codec, size));
+            return Ok(Block::missing(codec, size));
         }
         Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
     }
@@ -406,16 +407,17 @@ impl CoefficientFile {
         Ok(WindowCodec { lod, ..self.codec_of_all(window)? })
     }
 
-    /// Every n-th sample along each axis of a block, in some frames of its window (n, frames): frame after frame, x
+    /// Every n-th sample along each axis of a block, in some frames of its window: frame after frame, x
     /// fastest. NaN stands for missing samples, and for those of lost and damaged blocks that are skipped.
     pub(crate) fn coarse(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        (stride, frames): (usize, &[usize]),
+        stride: usize,
+        frames: &[usize],
     ) -> Result<Vec<f32>> {
         let (size, stride) = (self.all_voxels(entry)?, stride << self.lod);
-        coarse::thinned(&self.reader, codec, entry, size, (stride, frames)).map_err(|e| self.failed(e))
+        coarse::thinned(&self.reader, codec, entry, size, stride, frames).map_err(|e| self.failed(e))
     }
 
     /// Bytes of the file that were read so far.

@@ -2,7 +2,7 @@
 //! stored, with new checksums; nothing is coded anew. The merged file has the bytes of one conversion.
 
 use super::CoefficientFile;
-use super::shard::{Place, SHARD, without_shard};
+use super::shard::{SHARD, ShardRange, without_shard};
 use crate::base::description::{Description, extended, joined};
 use crate::base::error::{Error, Result};
 use crate::base::progress::Progress;
@@ -42,7 +42,7 @@ pub struct MergeReport {
 /// The part of a shard kept in memory. Its file is reopened when it is merged.
 struct Part {
     path: PathBuf,
-    place: Place,
+    place: ShardRange,
     windows: usize,
     bytes: u64,
 }
@@ -81,7 +81,7 @@ impl Shards {
         let (mut opened, mut unreadable) = (Vec::new(), Vec::new());
         for path in paths {
             progress.check()?;
-            match Opened::of(path, opened.first()) {
+            match Opened::open(path, opened.first()) {
                 Ok(shard) => opened.push(shard),
                 Err(Error::CoefficientFile { source, .. }) if skip_damaged && !source.is_io() => {
                     unreadable.push(path.clone());
@@ -95,7 +95,7 @@ impl Shards {
         check_order(&opened, skip_damaged)?;
         let none = || Error::setting("inputs", "no shard can be read");
         let lost = opened.first().ok_or_else(none)?.lost_windows(&opened)?;
-        let shards = Self::of(opened, lost).ok_or_else(none)?;
+        let shards = Self::in_order(opened, lost).ok_or_else(none)?;
         Ok(Self { unreadable, ..shards })
     }
 
@@ -109,19 +109,19 @@ impl Shards {
         }
         progress.start(Some(paths.len() as u64));
         let mut opened = Vec::new();
-        let own = Place { number: 0, of: 0, frames: 0..file.frames() as u64, all: 0 };
+        let own = ShardRange { number: 0, of: 0, frames: 0..file.frames() as u64, all: 0 };
         let whole = Opened::at(own, file, None)?;
         for path in paths {
             progress.check()?;
             let shard = CoefficientFile::open(path)?;
-            opened.push(Opened::at(Place::of(&shard)?, &shard, Some(&whole))?);
+            opened.push(Opened::at(ShardRange::from_file(&shard)?, &shard, Some(&whole))?);
             progress.advance(1);
         }
         progress.finish();
         opened.sort_by_key(|shard: &Opened| shard.part.place.number);
         check_order(&opened, true)?;
         opened.insert(0, whole);
-        let shards = Self::of(opened, None).ok_or_else(|| Error::setting("inputs", "no shard can be read"))?;
+        let shards = Self::in_order(opened, None).ok_or_else(|| Error::setting("inputs", "no shard can be read"))?;
         let gaps = shards.gaps().zip(&shards.parts).find(|(gap, _)| gap.start != gap.end);
         match gaps {
             Some((Range { start, end }, part)) => {
@@ -132,7 +132,7 @@ impl Shards {
     }
 
     /// Shards in order.
-    fn of(opened: Vec<Opened>, lost: Option<LostWindows>) -> Option<Self> {
+    fn in_order(opened: Vec<Opened>, lost: Option<LostWindows>) -> Option<Self> {
         let Opened { part, start, features, first_digest, .. } = opened.first()?;
         let (start, features, all) = (start.clone(), *features, part.place.all);
         let first_digest = if part.place.frames.start == 0 { *first_digest } else { 0 };
@@ -164,7 +164,8 @@ impl Shards {
         &self,
         begun: Option<CompletePrefix>,
         skip_damaged: bool,
-        (name, out): (&Path, impl Write),
+        name: &Path,
+        out: impl Write,
         progress: &dyn Progress,
     ) -> Result<MergeReport> {
         let failed = |source| Error::CoefficientFile { path: name.into(), source };
@@ -235,13 +236,13 @@ impl Opened {
     }
 
     /// Opens a shard; an error unless it was made like the first one.
-    fn of(path: &Path, first: Option<&Self>) -> Result<Self> {
+    fn open(path: &Path, first: Option<&Self>) -> Result<Self> {
         let file = CoefficientFile::open(path)?;
-        Self::at(Place::of(&file)?, &file, first)
+        Self::at(ShardRange::from_file(&file)?, &file, first)
     }
 
     /// A file with a known place; an error unless it was made like the first one.
-    fn at(place: Place, file: &CoefficientFile, first: Option<&Self>) -> Result<Self> {
+    fn at(place: ShardRange, file: &CoefficientFile, first: Option<&Self>) -> Result<Self> {
         let (path, description, metadata) = (file.path(), file.description()?, file.metadata());
         let features = file.reader.features();
         let start = without_shard(metadata);
@@ -332,7 +333,7 @@ impl<W: Write> Merger<'_, W> {
             return Ok(()); // the file's id and the order of shards say that they are these
         }
         let file = CoefficientFile::open(&part.path)?;
-        if Place::of(&file)? != part.place || file.bytes() != part.bytes {
+        if ShardRange::from_file(&file)? != part.place || file.bytes() != part.bytes {
             return Err(Error::changed(&part.path, "changed while it was merged"));
         }
         for window in 0..part.windows {
@@ -340,7 +341,7 @@ impl<W: Write> Merger<'_, W> {
                 continue;
             }
             progress.check()?;
-            self.add_window(&file, window as u32, (first_window + window, part.place.frames.start))?;
+            self.add_window(&file, window as u32, first_window + window, part.place.frames.start)?;
             progress.advance(1);
         }
         file.check_unchanged()
@@ -388,7 +389,7 @@ impl<W: Write> Merger<'_, W> {
 
     /// Copies a window of a shard. In the merged file it has the number `number`, and its first frame is later by
     /// `frames`, the frames before the shard.
-    fn add_window(&mut self, file: &CoefficientFile, window: u32, (number, frames): (usize, u64)) -> Result<()> {
+    fn add_window(&mut self, file: &CoefficientFile, window: u32, number: usize, frames: u64) -> Result<()> {
         let number = number as u32;
         let mut record = WindowRecord { number, ..file.metadata().window_record(window) };
         record.window.first_frame += frames;

@@ -32,7 +32,8 @@ pub struct RepackReport {
 /// A block is damaged, or `out` cannot be written.
 pub fn repack(
     file: &CoefficientFile,
-    (level, memory): (i32, usize),
+    level: i32,
+    memory: usize,
     name: &Path,
     out: impl Write,
     progress: &dyn Progress,
@@ -47,7 +48,7 @@ pub fn repack(
     let at_once = (memory / file.block_bytes()).clamp(1, MOST_BLOCKS);
     progress.start(Some(metadata.blocks()));
     for number in 0..metadata.windows.len() as u32 {
-        let to = WindowCodec::of_file(&metadata, &metadata.windows[number as usize]).map_err(failed)?;
+        let to = WindowCodec::from_metadata(&metadata, &metadata.windows[number as usize]).map_err(failed)?;
         let packing = BlockPacking { file, level, from: &file.codec(number)?, to: &to };
         writer.begin_window(metadata.window_record(number)).map_err(failed)?;
         for leaf in file.leaves(number) {
@@ -105,6 +106,6 @@ impl BlockPacking<'_> {
             return Ok(None);
         }
         let size = self.file.reader.geometry(entry.id)?.size;
-        encoder.repack(&self.file.reader, (self.from, self.to), size, entry).map(Some)
+        encoder.repack(&self.file.reader, self.from, self.to, size, entry).map(Some)
     }
 }

@@ -31,7 +31,7 @@ pub struct BoundReport {
 
 impl BoundReport {
     /// Of a file.
-    pub fn of(file: &Metadata) -> Self {
+    pub fn from_metadata(file: &Metadata) -> Self {
         let Metadata { bound, tolerance, .. } = *file;
         let promise = if tolerance == 0.0 { "every bit is kept".into() } else { words(file) };
         let (floor, samples, seed) = match bound {
@@ -134,7 +134,7 @@ impl WindowReport {
             first_frame: w.first_frame,
             frames: w.frames,
             basis: w.basis.name().into(),
-            scheme: Scheme::of_window(w).name(),
+            scheme: Scheme::from_window(w).name(),
             coefficients_per_voxel: w.coefficients,
             promised: w.delta,
             reached: w.reached,

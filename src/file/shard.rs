@@ -9,17 +9,17 @@ use wavesplat_format::Metadata;
 pub(crate) const SHARD: &str = "shard";
 pub(crate) const SHARD_OF: &str = "shard-of";
 
-/// The place of a shard, read from its settings.
+/// The number of a shard and its frames, read from its settings.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct ShardRange {
     pub(super) number: usize,
     pub(super) of: usize,
     pub(super) frames: Range<u64>,
     pub(super) all: u64,
 }
 
-impl Place {
-    pub(super) fn of(file: &CoefficientFile) -> Result<Self> {
+impl ShardRange {
+    pub(super) fn from_file(file: &CoefficientFile) -> Result<Self> {
         let named = |name| super::setting(file.metadata(), name);
         let place = named(SHARD).zip(named(SHARD_OF)).and_then(|(shard, frames)| {
             let (number, of) = shard.split_once('/')?;
@@ -41,12 +41,12 @@ impl Place {
 
 /// The frames of a shard, and how many its archive has; none of other files.
 pub fn frames_of_shard(file: &CoefficientFile) -> Option<(Range<u64>, u64)> {
-    Place::of(file).ok().map(|place| (place.frames, place.all))
+    ShardRange::from_file(file).ok().map(|place| (place.frames, place.all))
 }
 
 /// Where a file stands in its archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Standing {
+pub struct ShardPlace {
     /// The same for all shards of an archive, and for the merged file.
     pub archive: String,
     /// The frames of the archive that the file holds.
@@ -55,17 +55,17 @@ pub struct Standing {
     pub all: usize,
 }
 
-impl Standing {
-    /// Of a shard, or of a file that is a whole archive.
+impl ShardPlace {
+    /// The place of a shard, or of a file that is a whole archive.
     ///
     /// # Errors
     /// A shard that contradicts itself.
-    pub fn of(file: &CoefficientFile) -> Result<Self> {
+    pub fn from_file(file: &CoefficientFile) -> Result<Self> {
         let metadata = file.metadata();
         let id = without_shard(metadata).file_id(0, file.reader.features()).map_err(|e| file.failed(e))?;
         let (frames, all) = match super::setting(metadata, SHARD) {
             Some(_) => {
-                let Place { frames, all, .. } = Place::of(file)?;
+                let ShardRange { frames, all, .. } = ShardRange::from_file(file)?;
                 (frames.start as usize..frames.end as usize, all as usize)
             }
             None => (0..file.frames(), file.frames()),

@@ -72,7 +72,7 @@ pub struct Comparison {
     /// The largest share of its bound that a series uses, in the bound's own measure; more than 1 is outside.
     pub largest_share_of_bound: f64,
     /// Where that was, if there was any error: the worst sample of the series.
-    pub worst: Option<Place>,
+    pub worst: Option<SampleLocation>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
     /// Blocks with an error or a value beyond what the directory or the window's record states.
@@ -97,7 +97,7 @@ pub struct BlockPlace {
 
 /// A sample of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Place {
+pub struct SampleLocation {
     /// The frame, counted from the file's first.
     pub frame: usize,
     /// The voxel: x, y, z, counted from the file's first.
@@ -107,7 +107,7 @@ pub struct Place {
     pub channel: Option<&'static str>,
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for SampleLocation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [x, y, z] = self.voxel;
         write!(f, "frame {}, x {x}, y {y}, z {z}", self.frame)?;
@@ -219,7 +219,8 @@ fn check_block(
     let original = original(file, source, codec, entry, &region)?;
     let first_frame = file.window_range(entry.id.window).start;
     let channel = file.colour_transform().and_then(|_| CHANNELS.get(usize::from(entry.id.channel)).copied());
-    let place = |frame: usize, voxel: usize| Place { frame: first_frame + frame, voxel: region.voxel(voxel), channel };
+    let place =
+        |frame: usize, voxel: usize| SampleLocation { frame: first_frame + frame, voxel: region.voxel(voxel), channel };
     let (mut found, (lo, hi)) = compare(codec, &original, &block, place);
     let stated = entry.stats.reached.min(file.metadata().windows[entry.id.window as usize].reached);
     if found.largest_error > stated || lo < entry.stats.min || hi > entry.stats.max {
@@ -266,7 +267,7 @@ fn compare(
     codec: &WindowCodec,
     original: &[u8],
     decoded: &Block,
-    place: impl Fn(usize, usize) -> Place,
+    place: impl Fn(usize, usize) -> SampleLocation,
 ) -> (Comparison, (f64, f64)) {
     let size = codec.sample.size();
     let samples = original.len() / size;
@@ -290,7 +291,7 @@ fn compare(
                     true => (f64::INFINITY, 0.0),
                     false => {
                         range = join_ranges(range, (extracted[i], extracted[i]));
-                        (codec.error(splatted[i], extracted[i], source[i]), codec.promise.allowed(source[i]))
+                        (codec.error(splatted[i], extracted[i], source[i]), codec.bound.allowed(source[i]))
                     }
                 }
             })
@@ -301,13 +302,18 @@ fn compare(
 }
 
 /// Adds the errors of a series, each with what is allowed.
-fn add_series(codec: &WindowCodec, errors: &[(f64, f64)], place: impl Fn(usize) -> Place, found: &mut Comparison) {
+fn add_series(
+    codec: &WindowCodec,
+    errors: &[(f64, f64)],
+    place: impl Fn(usize) -> SampleLocation,
+    found: &mut Comparison,
+) {
     let largest = errors.iter().fold(0.0, |largest, (e, _)| e.max(largest));
     found.largest_error = found.largest_error.max(largest);
     found.squares += errors.iter().map(|(e, _)| e * e).sum::<f64>();
-    let holds = codec.promise.holds(errors.iter().copied());
+    let holds = codec.bound.holds(errors.iter().copied());
     found.series_outside += u64::from(!holds);
-    let share = codec.promise.share(errors.iter().copied());
+    let share = codec.bound.share(errors.iter().copied());
     let share = if holds { share.min(1.0) } else { share }; // rounded up beyond what holds
     if share > found.largest_share_of_bound {
         found.largest_share_of_bound = share;

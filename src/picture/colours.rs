@@ -24,7 +24,7 @@ pub(super) fn clear_values(
 ) -> Option<Clear> {
     match request.clear {
         ClearSpec::Nothing => None,
-        ClearSpec::Values(pair) => Some(Clear::of_values(pair.0.into(), range)),
+        ClearSpec::Values(pair) => Some(Clear::new(pair.0.into(), range)),
         // A logarithm is for values near empty space.
         ClearSpec::Auto if request.norm == Norm::Log => None,
         ClearSpec::Auto => {

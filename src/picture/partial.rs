@@ -20,7 +20,7 @@ use crate::base::grid::Region;
 use crate::base::inputs::spare_inputs;
 use crate::base::output::Output;
 use crate::base::report::report_text;
-use crate::file::shard::Standing;
+use crate::file::shard::ShardPlace;
 use crate::file::{CoefficientFile, setting};
 use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
 use crate::render::sink::Provenance;
@@ -146,7 +146,7 @@ fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
 
 /// Plans a partial sum: the settings that all parts share, and its own views, frames and voxels.
 fn plan_partial(request: &PictureRequest, opened: &Opened, file: &CoefficientFile, memory: usize) -> Result<Planned> {
-    let (standing, scene) = (Standing::of(file)?, opened.scene.as_ref());
+    let (standing, scene) = (ShardPlace::from_file(file)?, opened.scene.as_ref());
     let mut config = render_config(request, scene, Some(file), None, standing.all, memory)?;
     let look = shared_setup(request, opened, file, &config, &standing);
     let frames = [standing.frames.start, standing.frames.end];
@@ -167,7 +167,7 @@ fn shared_setup(
     opened: &Opened,
     file: &CoefficientFile,
     config: &RenderConfig,
-    standing: &Standing,
+    standing: &ShardPlace,
 ) -> Look {
     let (scene, m) = (opened.scene.as_ref(), file.metadata());
     Look {

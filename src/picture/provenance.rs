@@ -69,7 +69,7 @@ fn with_file(
         lod: Some(file.lod()).filter(|lod| *lod > 0),
         sample_error: certified.then(|| config.allowed.unwrap_or(0.0).max(reached)),
         file_id: Some(file.id().to_string()),
-        file_promise: Some(BoundReport::of(m).promise),
+        file_promise: Some(BoundReport::from_metadata(m).promise),
         file_reached: Some(reached),
         ..provenance
     }

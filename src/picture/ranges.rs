@@ -310,7 +310,7 @@ impl Ranges {
 
     /// The values that show the background, if small pictures have much empty space.
     pub(super) fn clear(&self, range: (f64, f64)) -> Option<(Clear, Common)> {
-        Clear::of_empty(&self.all, range)
+        Clear::empty_space(&self.all, range)
     }
 
     /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would

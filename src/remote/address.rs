@@ -37,7 +37,7 @@ impl Address {
     /// What is wrong with it, or with the settings of S3.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         match text.get(..5).filter(|scheme| scheme.eq_ignore_ascii_case("s3://")) {
-            Some(_) => S3::of(&text[5..], Profile::of_environment()?).map(|object| Self::S3(Box::new(object))),
+            Some(_) => S3::new(&text[5..], Profile::from_environment()?).map(|object| Self::S3(Box::new(object))),
             None => http(text),
         }
     }
@@ -96,7 +96,7 @@ fn http(text: &str) -> Result<Address, String> {
 
 impl S3 {
     /// The object at `bucket/key`.
-    fn of(place: &str, profile: Profile) -> Result<Self, String> {
+    fn new(place: &str, profile: Profile) -> Result<Self, String> {
         let (bucket, key) = place.split_once('/').unwrap_or((place, ""));
         if bucket.is_empty() || key.is_empty() || key.ends_with('/') {
             return Err("is no address of an object: s3://BUCKET/KEY".into());
@@ -131,7 +131,7 @@ mod tests {
     use super::*;
 
     fn url(place: &str, profile: Profile) -> String {
-        Address::S3(Box::new(S3::of(place, profile).expect("an address"))).url()
+        Address::S3(Box::new(S3::new(place, profile).expect("an address"))).url()
     }
 
     #[test]
@@ -166,9 +166,9 @@ mod tests {
     #[test]
     fn addresses_that_name_no_object_are_refused() {
         for place in ["", "lab", "lab/", "/run", "lab/run/", "lab/../other/run", "lab/./run"] {
-            assert!(S3::of(place, Profile::default()).is_err(), "{place}");
+            assert!(S3::new(place, Profile::default()).is_err(), "{place}");
         }
         let half = Profile { credentials: Some([Some("KEY".into()), None, None]), ..Profile::default() };
-        assert!(S3::of("lab/run", half).is_err());
+        assert!(S3::new("lab/run", half).is_err());
     }
 }

@@ -77,7 +77,8 @@ fn changed(how: &str) -> Failure {
 /// # Errors
 /// Every other answer.
 pub(super) fn check(
-    (status, headers): (u16, &HeaderMap),
+    status: u16,
+    headers: &HeaderMap,
     asked: &Range<u64>,
     known: Option<&About>,
 ) -> Result<About, Failure> {
@@ -155,7 +156,7 @@ mod tests {
     }
 
     fn answer(range: &str, etag: &str) -> Result<About, Failure> {
-        check((206, &headers(&[("Content-Range", range), ("ETag", etag)])), &(10..20), Some(&known()))
+        check(206, &headers(&[("Content-Range", range), ("ETag", etag)]), &(10..20), Some(&known()))
     }
 
     fn known() -> About {
@@ -183,9 +184,9 @@ mod tests {
             assert!(!is_change(refused), "{range}");
         }
         let open = headers(&[("Content-Range", "bytes 0-99/100")]);
-        assert_eq!(check((206, &open), &(0..4096), None).expect("sound").len, 100);
+        assert_eq!(check(206, &open, &(0..4096), None).expect("sound").len, 100);
         for range in ["bytes 0-18446744073709551615/18446744073709551615", "bytes 0-4095/18446744073709551615"] {
-            assert!(check((206, &headers(&[("Content-Range", range)])), &(0..4096), None).is_err(), "{range}");
+            assert!(check(206, &headers(&[("Content-Range", range)]), &(0..4096), None).is_err(), "{range}");
         }
     }
 
@@ -194,20 +195,20 @@ mod tests {
         assert!(is_change(answer("bytes 10-19/101", "\"a\"")));
         assert!(is_change(answer("bytes 10-19/100", "\"b\"")));
         for status in [404, 410, 412, 416] {
-            assert!(is_change(check((status, &headers(&[])), &(0..1), Some(&known()))), "{status}");
+            assert!(is_change(check(status, &headers(&[]), &(0..1), Some(&known()))), "{status}");
         }
         let of = |modified| {
-            check((206, &headers(&[("Content-Range", "bytes 0-0/100"), ("Last-Modified", modified)])), &(0..1), None)
+            check(206, &headers(&[("Content-Range", "bytes 0-0/100"), ("Last-Modified", modified)]), &(0..1), None)
         };
         let first = of("Mon, 1").expect("sound");
         let later = headers(&[("Content-Range", "bytes 0-0/100"), ("Last-Modified", "Tue, 2")]);
-        assert!(is_change(check((206, &later), &(0..1), Some(&first))));
+        assert!(is_change(check(206, &later, &(0..1), Some(&first))));
         assert_eq!(first.version(), Some("Mon, 1"));
     }
 
     #[test]
     fn refusals_say_what_is_wrong() {
-        let refused = |status, list: &[(&str, &str)]| check((status, &headers(list)), &(0..9), None);
+        let refused = |status, list: &[(&str, &str)]| check(status, &headers(list), &(0..9), None);
         for (status, part) in [(200, "parts"), (401, "password"), (403, "allow"), (404, "no such"), (418, "418")] {
             let error = error(refused(status, &[]));
             assert!(error.to_string().contains(part), "{status}: {error}");
@@ -219,7 +220,7 @@ mod tests {
 
     #[test]
     fn busy_servers_are_asked_again() {
-        let busy = |wait| check((503, &headers(&[("Retry-After", wait)])), &(0..9), None);
+        let busy = |wait| check(503, &headers(&[("Retry-After", wait)]), &(0..9), None);
         assert!(matches!(busy("7"), Err(Failure::Temporary(_, Some(wait))) if wait.as_secs() == 7));
         assert!(matches!(busy("Fri, 31 Dec 1999 23:59:59 GMT"), Err(Failure::Temporary(_, None))));
     }

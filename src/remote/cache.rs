@@ -52,7 +52,7 @@ impl Cache {
     /// The cache entry of one object, identified by its name, first bytes, version and length. The first bytes hold the
     /// identity of a coefficient file.
     #[cfg_attr(not(feature = "remote"), allow(dead_code, reason = "only objects of servers have this"))]
-    pub(super) fn object(&self, name: &Path, (first, version, len): (&[u8], &str, u64)) -> CachedObject {
+    pub(super) fn object(&self, name: &Path, first: &[u8], version: &str, len: u64) -> CachedObject {
         let digests =
             [name.as_os_str().as_encoded_bytes(), first, version.as_bytes(), &len.to_le_bytes()].map(xxh3_128);
         let digest = xxh3_128(&digests.map(u128::to_le_bytes).concat());
@@ -168,23 +168,23 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let cache = Cache::new(folder.path().join("deep/er"), 1 << 30).expect("a folder");
         let name = Path::new("https://host/run.wspl");
-        let object = cache.object(name, (b"first", "\"1\"", 100_000));
+        let object = cache.object(name, b"first", "\"1\"", 100_000);
         object.store(1, &[7; 30_000]);
         assert_eq!(object.load(1, 30_000), Some(vec![7; 30_000]));
-        assert_eq!(cache.object(name, (b"first", "\"1\"", 100_000)).load(1, 30_000), Some(vec![7; 30_000]));
+        assert_eq!(cache.object(name, b"first", "\"1\"", 100_000).load(1, 30_000), Some(vec![7; 30_000]));
         assert_eq!((object.load(1, 9), object.load(0, 30_000)), (None, None));
-        assert_eq!(cache.object(Path::new("other"), (b"first", "\"1\"", 100_000)).load(1, 30_000), None);
+        assert_eq!(cache.object(Path::new("other"), b"first", "\"1\"", 100_000).load(1, 30_000), None);
         for (first, version, len) in
             [("other", "\"1\"", 100_000), ("first", "\"2\"", 100_000), ("first", "\"1\"", 100_001)]
         {
-            assert_eq!(cache.object(name, (first.as_bytes(), version, len)).load(1, 30_000), None);
+            assert_eq!(cache.object(name, first.as_bytes(), version, len).load(1, 30_000), None);
         }
     }
 
     #[test]
     fn damaged_pages_are_not_used() {
         let folder = tempfile::tempdir().expect("a folder");
-        let object = Cache::new(folder.path(), 1 << 30).expect("a folder").object(Path::new("a"), (b"", "", 1000));
+        let object = Cache::new(folder.path(), 1 << 30).expect("a folder").object(Path::new("a"), b"", "", 1000);
         object.store(0, &[1; 1000]);
         let whole = fs::read(object.path(0)).expect("it was stored");
         for at in [0, 500, 999, 1000, 1007] {
@@ -213,8 +213,7 @@ mod tests {
             for name in ["a", "b", "c"] {
                 let folder = folder.path();
                 scope.spawn(move || {
-                    let object =
-                        Cache::new(folder, most).expect("a folder").object(Path::new(name), (b"", "", 1 << 30));
+                    let object = Cache::new(folder, most).expect("a folder").object(Path::new(name), b"", "", 1 << 30);
                     (0..40).for_each(|page| object.store(page, &[3; 10_000]));
                 });
             }

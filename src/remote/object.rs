@@ -47,7 +47,7 @@ pub(super) fn open(address: &Path, options: &RemoteOptions) -> error::Result<Pag
     let doing = of.server().map_or("opening".into(), |server| format!("opening at {server}"));
     let (object, first) = Object::open(of, options.timeout).map_err(|e| Error::io(&name, doing, e))?;
     let version = options.cache.as_ref().zip(object.about.version());
-    let on_disk = version.map(|(cache, version)| cache.object(&name, (&first, version, object.about.len)));
+    let on_disk = version.map(|(cache, version)| cache.object(&name, &first, version, object.about.len));
     Ok(Paged::new(object, on_disk).begun(&first))
 }
 
@@ -57,17 +57,17 @@ pub(super) struct Object {
     address: Address,
     agent: Agent,
     about: About,
-    turns: Turns,
+    limit: RequestLimit,
 }
 
 /// Limits the number of simultaneous requests, whatever the number of threads that make them.
 #[derive(Debug)]
-struct Turns {
+struct RequestLimit {
     free: Mutex<usize>,
     left: Condvar,
 }
 
-impl Turns {
+impl RequestLimit {
     fn new(free: usize) -> Self {
         Self { free: Mutex::new(free), left: Condvar::new() }
     }
@@ -86,15 +86,15 @@ impl Object {
     /// Opens an object, and returns its first bytes with it.
     fn open(address: Address, timeout: Duration) -> io::Result<(Self, Vec<u8>)> {
         let agent = agent(&address, timeout);
-        let opening = Self { address, agent, about: About::default(), turns: Turns::new(SIDE_BY_SIDE) };
-        let (about, first) = patiently(|| opening.ask(&(0..FIRST), None))?;
+        let opening = Self { address, agent, about: About::default(), limit: RequestLimit::new(SIDE_BY_SIDE) };
+        let (about, first) = with_retries(|| opening.ask(&(0..FIRST), None))?;
         Ok((Self { about, ..opening }, first))
     }
 
     /// Reads a range within the object.
     fn read(&self, range: &Range<u64>) -> io::Result<Vec<u8>> {
-        let ask = || self.turns.take(|| self.ask(range, Some(&self.about)));
-        patiently(ask).map(|(_, bytes)| bytes)
+        let ask = || self.limit.take(|| self.ask(range, Some(&self.about)));
+        with_retries(ask).map(|(_, bytes)| bytes)
     }
 
     /// Requests a range once. `known` is the result of earlier answers, if any.
@@ -109,7 +109,7 @@ impl Object {
         }
         let (head, body) = request.call().map_err(failure)?.into_parts();
         let status = head.status.as_u16();
-        match check((status, &head.headers), range, known) {
+        match check(status, &head.headers, range, known) {
             Ok(about) => body_of(body, range.end.min(about.len) - range.start).map(|bytes| (about, bytes)),
             Err(Failure::Refused(error)) => Err(self.explained(&error, status, body)),
             Err(failure) => Err(failure),
@@ -178,7 +178,7 @@ fn side_by_side(
 }
 
 /// Retries a request until it succeeds, fails for good, or has been tried five times.
-fn patiently<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
+fn with_retries<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
     let mut wait = FIRST_WAIT;
     for _ in 1..TRIES {
         match request() {

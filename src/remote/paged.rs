@@ -56,7 +56,7 @@ type Page = Arc<[u8]>;
 struct Pages {
     held: HashMap<u64, Held>,
     /// Pages that a thread is reading.
-    coming: HashSet<u64>,
+    in_flight: HashSet<u64>,
     /// Counts uses.
     clock: u64,
 }
@@ -91,16 +91,16 @@ impl Pages {
 }
 
 /// Pages that this thread is reading. When dropped, it lets other threads read the pages that did not arrive.
-struct Promise<'a, S> {
+struct PageClaim<'a, S> {
     to: &'a Paged<S>,
     pages: Vec<u64>,
 }
 
-impl<S> Drop for Promise<'_, S> {
+impl<S> Drop for PageClaim<'_, S> {
     fn drop(&mut self) {
         let mut pages = self.to.lock();
         self.pages.iter().for_each(|page| {
-            pages.coming.remove(page);
+            pages.in_flight.remove(page);
         });
         self.to.arrived.notify_all();
     }
@@ -132,9 +132,8 @@ impl<S: Storage> Paged<S> {
     fn get(&self, wanted: &BTreeSet<u64>) -> io::Result<BTreeMap<u64, Page>> {
         let mut found = BTreeMap::new();
         while found.len() < wanted.len() {
-            let promise = self.promise(wanted, &mut found);
-            let missing: Vec<u64> =
-                promise.pages.iter().copied().filter(|page| !self.load(*page, &mut found)).collect();
+            let claim = self.claim(wanted, &mut found);
+            let missing: Vec<u64> = claim.pages.iter().copied().filter(|page| !self.load(*page, &mut found)).collect();
             self.read(&missing, &mut found)?;
         }
         Ok(found)
@@ -142,7 +141,7 @@ impl<S: Storage> Paged<S> {
 
     /// Takes the wanted pages that are in memory, and claims those that no thread is reading. If other threads are
     /// reading all of the rest, waits until some arrive.
-    fn promise(&self, wanted: &BTreeSet<u64>, found: &mut BTreeMap<u64, Page>) -> Promise<'_, S> {
+    fn claim(&self, wanted: &BTreeSet<u64>, found: &mut BTreeMap<u64, Page>) -> PageClaim<'_, S> {
         let mut pages = self.lock();
         loop {
             for page in wanted {
@@ -152,11 +151,11 @@ impl<S: Storage> Paged<S> {
                     found.insert(*page, bytes);
                 }
             }
-            let free = |page: &&u64| !found.contains_key(page) && !pages.coming.contains(page);
+            let free = |page: &&u64| !found.contains_key(page) && !pages.in_flight.contains(page);
             let mine: Vec<u64> = wanted.iter().filter(free).copied().collect();
             if !mine.is_empty() || found.len() == wanted.len() {
-                pages.coming.extend(&mine);
-                return Promise { to: self, pages: mine };
+                pages.in_flight.extend(&mine);
+                return PageClaim { to: self, pages: mine };
             }
             pages = self.arrived.wait(pages).unwrap_or_else(PoisonError::into_inner);
         }

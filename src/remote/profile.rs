@@ -23,19 +23,22 @@ impl Profile {
     ///
     /// # Errors
     /// A named profile that is not there, files that are not understood, and profiles whose credentials are elsewhere.
-    pub(super) fn of_environment() -> Result<Self, String> {
+    pub(super) fn from_environment() -> Result<Self, String> {
         let variable = |name: &str| env::var(name).ok().filter(|value| !value.trim().is_empty());
-        Self::of(&variable, &|path| std::fs::read_to_string(path).ok())
+        Self::from_sources(&variable, &|path| std::fs::read_to_string(path).ok())
     }
 
-    /// As [`Self::of_environment`], of these variables and files.
-    fn of(variable: &dyn Fn(&str) -> Option<String>, file: &dyn Fn(PathBuf) -> Option<String>) -> Result<Self, String> {
+    /// As [`Self::from_environment`], from these variables and files.
+    fn from_sources(
+        variable: &dyn Fn(&str) -> Option<String>,
+        file: &dyn Fn(PathBuf) -> Option<String>,
+    ) -> Result<Self, String> {
         let home = |name: &str| variable("HOME").map(|home| PathBuf::from(home).join(".aws").join(name));
         let path = |named: &str, name: &str| variable(named).map(PathBuf::from).or_else(|| home(name));
         let credentials = path("AWS_SHARED_CREDENTIALS_FILE", "credentials").and_then(file).unwrap_or_default();
         let config = path("AWS_CONFIG_FILE", "config").and_then(file).unwrap_or_default();
         let named = variable("AWS_PROFILE");
-        let stored = Stored::of([&credentials, &config], named.as_deref())?;
+        let stored = Stored::parse([&credentials, &config], named.as_deref())?;
         let first =
             |names: &[&str], key: &str| names.iter().find_map(|name| variable(name)).or_else(|| stored.get(key));
         let of_environment = variable("AWS_ACCESS_KEY_ID")
@@ -58,7 +61,7 @@ struct Stored {
 
 impl Stored {
     /// A profile of the texts of the files of credentials and of settings; an error if it was `named` but is in neither.
-    fn of([credentials, config]: [&str; 2], named: Option<&str>) -> Result<Self, String> {
+    fn parse([credentials, config]: [&str; 2], named: Option<&str>) -> Result<Self, String> {
         let name = named.unwrap_or("default").to_string();
         let parsed = |text: &str, what: &str| {
             let mut ini = Ini::new_cs();
@@ -103,7 +106,7 @@ mod tests {
     fn profile(variables: &[(&str, &str)], credentials: &str, config: &str) -> Result<Profile, String> {
         let all = [("HOME", "/home/me")].into_iter().chain(variables.iter().copied()).collect::<Vec<_>>();
         let variable = |name: &str| all.iter().find(|(known, _)| *known == name).map(|(_, value)| value.to_string());
-        Profile::of(&variable, &|path| match path {
+        Profile::from_sources(&variable, &|path| match path {
             path if path == Path::new("/home/me/.aws/credentials") => Some(credentials.into()),
             path if path == Path::new("/home/me/.aws/config") => Some(config.into()),
             _ => None,

@@ -50,7 +50,7 @@ impl ColourTransform {
             Some(value) => Some(value.parse().ok()?),
             None => None,
         };
-        Some(Self { colours: TransferFunction::of_text(colours?)?, sample: sample?.parse().ok()?, missing_value })
+        Some(Self { colours: TransferFunction::parse(colours?)?, sample: sample?.parse().ok()?, missing_value })
     }
 
     /// One channel of the colours of some samples, little-endian as these. `out` has room for as many of
@@ -118,7 +118,7 @@ mod tests {
         let points = vec![(0.0, [0.0, 0.5, 1.0]), (2.0, [1.0, 0.5, 0.0])];
         let nan = Some([0.25; 3]);
         let colours =
-            TransferFunction::of_points(points, crate::colour::ColourSpace::Rgb, None, nan).expect("two points");
+            TransferFunction::from_points(points, crate::colour::ColourSpace::Rgb, None, nan).expect("two points");
         let colour_transform = ColourTransform { colours, sample: SampleType::F64, missing_value: Some(1.0) };
         let values = [0.0, -0.0, 0.5, 0.5, 3.0, 1.0, f64::NAN, f64::INFINITY, -7.0];
         let missing = |v: &f32| v.is_nan();

@@ -91,7 +91,7 @@ fn counted(units: &Units) -> String {
 }
 
 fn clock(units: &Units) -> std::result::Result<Clock, String> {
-    Clock::of(units.times.as_deref().unwrap_or_default(), units.calendar.as_deref())
+    Clock::parse(units.times.as_deref().unwrap_or_default(), units.calendar.as_deref())
 }
 
 /// Puts the user's times in place of those of the files, and the files' onto the clock of an earlier archive.

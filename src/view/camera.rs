@@ -65,6 +65,15 @@ pub struct Camera {
 /// Share of the picture that the volume fills at the default scale.
 const FIT: f64 = 0.9;
 
+/// Bounds of the rounding error in the projection of a voxel.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ProjectionError {
+    /// In pixels along each axis.
+    pub(crate) pixels: f64,
+    /// In depth, in world units.
+    pub(crate) depth: f64,
+}
+
 impl Camera {
     /// The camera for a view of `grid`.
     ///
@@ -144,13 +153,13 @@ impl Camera {
         corners(grid).map(|p| self.project(p)[2]).fold(f64::INFINITY, f64::min)
     }
 
-    /// Bounds of the rounding error in the projection of any voxel of `grid`: pixels along each axis, and world units
-    /// of depth.
-    pub(crate) fn rounding(&self, grid: &Grid) -> (f64, f64) {
+    /// Bounds of the rounding error in the projection of any voxel of `grid`.
+    pub(crate) fn rounding(&self, grid: &Grid) -> ProjectionError {
         let size = |p: [f64; 3]| p.iter().map(|c| c.abs()).sum::<f64>();
         let far = corners(grid).map(size).fold(size(self.center), f64::max);
         let depth = 64.0 * f64::EPSILON * far; // some twenty operations on numbers of at most twice this size
-        (self.scale * depth + 4.0 * f64::EPSILON * self.size[0].max(self.size[1]) as f64, depth)
+        let pixels = self.scale * depth + 4.0 * f64::EPSILON * self.size[0].max(self.size[1]) as f64;
+        ProjectionError { pixels, depth }
     }
 
     /// The largest scale at which every cell of the grid lies within the picture, with a margin.

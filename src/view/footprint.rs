@@ -23,6 +23,7 @@
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
+use crate::view::camera::ProjectionError;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -37,7 +38,7 @@ pub struct Kernel {
 
 impl Kernel {
     /// The default kernel of a grid: sigma is 0.75 of the largest spacing, without attenuation.
-    pub fn of_grid(grid: &Grid) -> Self {
+    pub fn for_grid(grid: &Grid) -> Self {
         Self { sigma: 0.75 * grid.largest_spacing(), tau: 0.0 }
     }
 
@@ -46,7 +47,7 @@ impl Kernel {
     /// # Errors
     /// A sigma that is not above 0, a tau below 0, or either not finite.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
-        let sigma = sigma.unwrap_or(Self::of_grid(grid).sigma);
+        let sigma = sigma.unwrap_or(Self::for_grid(grid).sigma);
         if !(sigma.is_finite() && sigma > 0.0) {
             return Err(Error::setting("sigma", "takes a number above 0"));
         }
@@ -129,7 +130,7 @@ impl Footprint {
     /// The sum of weights at a point of `count` voxels in a row. The first voxel is `off` pixels from the point at
     /// depth `z`; each next voxel is a `step` in pixels and a step in depth further. The voxels should not lie much
     /// further than the reach.
-    pub(crate) fn sum_of_row(&self, off: [f64; 2], z: f64, (step, deeper): ([f64; 2], f64), count: usize) -> f64 {
+    pub(crate) fn sum_of_row(&self, off: [f64; 2], z: f64, step: [f64; 2], deeper: f64, count: usize) -> f64 {
         let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
         let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
         if self.decay > NARROW || exponent(off, z) > DEEP {
@@ -158,11 +159,10 @@ impl Footprint {
         std::f64::consts::PI / self.decay
     }
 
-    /// Bound of the relative rounding error of a weight, given the errors of its position (in pixels along each axis)
-    /// and of its depth (in world units). The depth is at most `depth`.
-    pub(crate) fn rounding(&self, (pixels, off): (f64, f64), depth: f64) -> f64 {
-        let across = 2.0 * self.decay * (self.reach + 1.0) * pixels;
-        let along = self.tau * (off + 4.0 * f64::EPSILON * depth);
+    /// Bound of the relative rounding error of a weight, given the errors of its position. The depth is at most `depth`.
+    pub(crate) fn rounding(&self, error: ProjectionError, depth: f64) -> f64 {
+        let across = 2.0 * self.decay * (self.reach + 1.0) * error.pixels;
+        let along = self.tau * (error.depth + 4.0 * f64::EPSILON * depth);
         libm::expm1(2.0 * across + along) + EXPONENTIALS
     }
 
@@ -248,7 +248,7 @@ mod tests {
                 for (z, deeper) in [(3.0, 0.5), (3.0, -0.5), (7e3, -0.5), (7.45e3, -50.0)] {
                     let depth = |n: usize| z + deeper * n as f64;
                     let expected: f64 = (0..count).map(|n| f.at_depth(depth(n)) * f.share(at(n))).sum();
-                    let found = f.sum_of_row(off, z, (step, deeper), count);
+                    let found = f.sum_of_row(off, z, step, deeper, count);
                     let off = (found - expected).abs();
                     assert!(off <= 1e-9 * expected + 1e-320, "{scale} {step:?} {z}: {found} for {expected}");
                 }

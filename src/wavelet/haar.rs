@@ -13,6 +13,7 @@
 //! coefficients (eq 6).
 
 use super::{LANES, Lane, TimeBasis};
+use crate::base::vectors::dispatch;
 
 /// The Haar basis for one window.
 #[derive(Debug)]
@@ -54,15 +55,15 @@ impl TimeBasis for Haar {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        forward(&self.steps, series, coefficients);
+        dispatch!(forward(&self.steps[..], series, coefficients));
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        inverse(&self.steps, coefficients, series);
+        dispatch!(inverse(&self.steps[..], &*coefficients, series));
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn forward(steps: &[Vec<(f64, f64)>], series: &[Lane], coefficients: &mut [Lane]) {
     let mut sums = series.to_vec();
     let mut end = series.len();
@@ -79,7 +80,7 @@ fn forward(steps: &[Vec<(f64, f64)>], series: &[Lane], coefficients: &mut [Lane]
     coefficients[..end].copy_from_slice(&sums);
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn inverse(steps: &[Vec<(f64, f64)>], coefficients: &[Lane], series: &mut [Lane]) {
     series[0] = coefficients[0];
     let mut len = 1;

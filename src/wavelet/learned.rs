@@ -5,6 +5,7 @@
 //! earlier ones, functions of single frames follow.
 
 use super::{Haar, LANES, Lane, TimeBasis, synthesis};
+use crate::base::vectors::dispatch;
 
 /// The unit of a stored function's values.
 const UNIT: f64 = 1.0 / 32768.0;
@@ -32,10 +33,10 @@ impl Learned {
                 rows.extend(orthonormal(candidate, &rows));
             }
         }
-        Self::of_rows(rows, frames)
+        Self::from_rows(rows, frames)
     }
 
-    fn of_rows(rows: Vec<Vec<f64>>, frames: usize) -> Self {
+    fn from_rows(rows: Vec<Vec<f64>>, frames: usize) -> Self {
         let columns = (0..frames).map(|t| rows.iter().map(|row| row[t]).collect()).collect();
         Self { rows, columns, frames }
     }
@@ -84,11 +85,11 @@ impl TimeBasis for Learned {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        sums_of_products(&self.rows, series, coefficients);
+        dispatch!(sums_of_products(&self.rows[..], series, coefficients));
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        sums_of_products(&self.columns, coefficients, series);
+        dispatch!(sums_of_products(&self.columns[..], &*coefficients, series));
     }
 
     fn only(&self, marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
@@ -96,17 +97,21 @@ impl TimeBasis for Learned {
             return None;
         }
         let rows = self.rows.iter().zip(marked).filter(|(_, marked)| **marked).map(|(row, _)| row.clone());
-        Some(Box::new(Self::of_rows(rows.collect(), self.frames)))
+        Some(Box::new(Self::from_rows(rows.collect(), self.frames)))
     }
 }
 
 /// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last (eq 5, or its transpose).
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn sums_of_products(factors: &[Vec<f64>], lanes: &[Lane], out: &mut [Lane]) {
     let (some, last) = factors.as_chunks::<SIDE_BY_SIDE>();
     let (some_out, last_out) = out.as_chunks_mut::<SIDE_BY_SIDE>();
-    some_out.iter_mut().zip(some).for_each(|(out, factors)| *out = products(factors, lanes));
-    last_out.iter_mut().zip(last).for_each(|(out, factors)| [*out] = products(std::array::from_ref(factors), lanes));
+    for (out, factors) in some_out.iter_mut().zip(some) {
+        *out = products(factors, lanes);
+    }
+    for (out, factors) in last_out.iter_mut().zip(last) {
+        [*out] = products(std::array::from_ref(factors), lanes);
+    }
 }
 
 #[inline(always)]

@@ -27,6 +27,7 @@
 //! A window of another length is extended with its last sample to the next 2N + 1, only within this file.
 
 use super::{LANES, Lane, TimeBasis};
+use crate::base::vectors::dispatch;
 
 const Q: f64 = std::f64::consts::SQRT_2;
 
@@ -71,15 +72,15 @@ impl TimeBasis for Multi {
     }
 
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]) {
-        forward(self.intervals, series, coefficients);
+        dispatch!(forward(self.intervals, series, coefficients));
     }
 
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
-        inverse(self.intervals, coefficients, series);
+        dispatch!(inverse(self.intervals, &*coefficients, series));
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
     let mut fine = series.to_vec();
     fine.resize(coefficients.len(), series[series.len() - 1]);
@@ -87,20 +88,24 @@ fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
     prefilter(&mut fine);
     while intervals > 1 {
         let wavelets = &mut coefficients[intervals + 1..2 * intervals + 1];
-        for_each_filter(intervals, |to, at, taps| {
-            let out = dot(taps, &fine[at..]);
-            match to {
-                Target::Scaling(i) => coarse[i] = out,
-                Target::Wavelet(i) => wavelets[i] = out,
-            }
-        });
+        for_each_filter(
+            intervals,
+            #[inline(always)]
+            |to, at, taps| {
+                let out = dot(taps, &fine[at..]);
+                match to {
+                    Target::Scaling(i) => coarse[i] = out,
+                    Target::Wavelet(i) => wavelets[i] = out,
+                }
+            },
+        );
         std::mem::swap(&mut fine, &mut coarse);
         intervals /= 2;
     }
     coefficients[..3].copy_from_slice(&fine[..3]);
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
     let mut coarse = coefficients.to_vec();
     let mut fine = coarse.clone();
@@ -108,10 +113,14 @@ fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
     while intervals <= most {
         let wavelets = &coefficients[intervals + 1..2 * intervals + 1];
         fine[..2 * intervals + 1].fill(Lane::default());
-        for_each_filter(intervals, |from, at, taps| match from {
-            Target::Scaling(i) => add_scaled(taps, &coarse[i], &mut fine[at..]),
-            Target::Wavelet(i) => add_scaled(taps, &wavelets[i], &mut fine[at..]),
-        });
+        for_each_filter(
+            intervals,
+            #[inline(always)]
+            |from, at, taps| match from {
+                Target::Scaling(i) => add_scaled(taps, &coarse[i], &mut fine[at..]),
+                Target::Wavelet(i) => add_scaled(taps, &wavelets[i], &mut fine[at..]),
+            },
+        );
         std::mem::swap(&mut fine, &mut coarse);
         intervals *= 2;
     }

@@ -40,7 +40,7 @@ impl Numbered {
     }
 
     /// The name of a frame's file.
-    pub(crate) fn of(&self, frame: usize) -> PathBuf {
+    pub(crate) fn path(&self, frame: usize) -> PathBuf {
         match self.digits {
             Some(digits) => format!("{}{frame:0digits$}{}", self.before, self.after).into(),
             None => PathBuf::from(&self.before),
@@ -85,14 +85,14 @@ mod tests {
 
     #[test]
     fn patterns_number_files() {
-        let name = |pattern: &str, frame| Numbered::new(Path::new(pattern), 2).map(|n| n.of(frame));
+        let name = |pattern: &str, frame| Numbered::new(Path::new(pattern), 2).map(|n| n.path(frame));
         assert_eq!(name("a_%04d.png", 7).expect("a pattern"), Path::new("a_0007.png"));
         assert_eq!(name("a_%d.png", 12).expect("a pattern"), Path::new("a_12.png"));
         for bad in ["a.png", "a_%x.png", "a_%4d_%d.png", "a%"] {
             assert!(name(bad, 0).is_err(), "{bad}");
         }
-        assert_eq!(Numbered::after("100%", "vti").of(7), Path::new("100%_0007.vti"));
-        assert_eq!(Numbered::new(Path::new("a.png"), 1).expect("one picture").of(5), Path::new("a.png"));
+        assert_eq!(Numbered::after("100%", "vti").path(7), Path::new("100%_0007.vti"));
+        assert_eq!(Numbered::new(Path::new("a.png"), 1).expect("one picture").path(5), Path::new("a.png"));
     }
 
     #[test]

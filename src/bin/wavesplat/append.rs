@@ -115,7 +115,7 @@ impl AppendArgs {
         let shards = Shards::after(file, &self.inputs, &self.common.progress("open", "shards"))?;
         let (mut out, begun) = open_successor(file, IfUnfinished::from_flags(self.force, self.resume))?;
         let progress = self.common.progress("merge", "windows");
-        let report = shards.merge(Some(begun), false, (file.path(), &mut out), &progress)?;
+        let report = shards.merge(Some(begun), false, file.path(), &mut out, &progress)?;
         file.check_unchanged()?;
         out.commit_if(resume::check)?;
         let (frames, bytes) = (report.frames, report.output_bytes);

@@ -47,7 +47,7 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     let shards = Shards::open(&args.shards, args.skip_damaged, &args.common.progress("open", "shards"))?;
     let (mut out, begun) = resume::open(&args.output, args.force, IfUnfinished::from_flags(args.force, args.resume))?;
     let progress = args.common.progress("merge", "windows");
-    let report = shards.merge(begun, args.skip_damaged, (&args.output, &mut out), &progress)?;
+    let report = shards.merge(begun, args.skip_damaged, &args.output, &mut out, &progress)?;
     out.commit_if(resume::check)?;
     for shard in &report.unreadable {
         let what = "cannot be opened; wavesplat recover saves what is whole";

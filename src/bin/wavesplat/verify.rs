@@ -61,7 +61,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         None => None,
     };
     let report = verify(&file, source, args.common.memory.0, &args.common.progress("verify", "blocks"))?;
-    let (promise, delta) = (BoundReport::of(file.metadata()), largest_bound(file.metadata()));
+    let (promise, delta) = (BoundReport::from_metadata(file.metadata()), largest_bound(file.metadata()));
     if args.common.json {
         args.common.report(&Reported { report: &report, promise, delta }, false)?;
     } else if !args.common.quiet {

@@ -30,7 +30,7 @@ impl<R: Real> Correction<R> for Decoding<'_, R> {
             let (places, values) = self.codes.run(run + slice);
             for (place, code) in places.iter().zip(values) {
                 let node = &mut nodes[*place as usize];
-                *node = *node + R::of_code(*code) * *step;
+                *node = *node + R::from_code(*code) * *step;
             }
         }
     }

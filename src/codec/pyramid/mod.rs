@@ -33,7 +33,8 @@ mod tests;
 use super::buffer::Buffer;
 use super::codes::PooledCodes;
 use super::real::Real;
-use super::rows::{self, Change};
+use super::rows::{self, Change, add_changes, add_changes_to_zero};
+use crate::base::vectors::dispatch;
 use crate::wavelet;
 use corrections::{Correction, Decoding, Encoding};
 use refine::gather;
@@ -245,8 +246,10 @@ impl<'a> PredictionPasses<'a> {
     pub(crate) fn encode<R: Real>(
         &self,
         step: f64,
-        (source, size): (&[R], [usize; 3]),
-        (field, split): (&mut [R], &mut Vec<R>),
+        source: &[R],
+        size: [usize; 3],
+        field: &mut [R],
+        split: &mut Vec<R>,
         codes: &mut [i32],
     ) -> bool {
         let mut fits = true;
@@ -254,7 +257,7 @@ impl<'a> PredictionPasses<'a> {
         split.resize(self.codes() / self.pyramids, R::default());
         let sources = source.chunks_exact(size.iter().product::<usize>() * self.shape[3]);
         for ((nodes, source), ranges) in field.chunks_exact_mut(self.pyramid_nodes()).zip(sources).zip(&ranges) {
-            self.split((source, size), split);
+            self.split(source, size, split);
             let codes = apart(codes, ranges);
             let mut encoding = Encoding { split, codes, passes: self.inverses(step), fits: true };
             self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);
@@ -264,7 +267,7 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// Sorts the source's nodes of a pyramid by the passes that add them.
-    fn split<R: Real>(&self, (source, [nx, ny, nz]): (&[R], [usize; 3]), split: &mut [R]) {
+    fn split<R: Real>(&self, source: &[R], [nx, ny, nz]: [usize; 3], split: &mut [R]) {
         let mut rest = split;
         for pass in &self.passes {
             let [x, y, z, t] = pass.extent();
@@ -273,7 +276,7 @@ impl<'a> PredictionPasses<'a> {
                 let start = at(0, 0) + nx * (at(1, y) + ny * (at(2, z) + nz * at(3, t)));
                 let (row, after) = std::mem::take(&mut rest).split_at_mut(x);
                 if x > 0 {
-                    gather(&source[start..], pass.nodes(0).1, row);
+                    dispatch!(gather(&source[start..], pass.nodes(0).1, row));
                 }
                 rest = after;
             }
@@ -300,15 +303,15 @@ impl<'a> PredictionPasses<'a> {
         decoding: impl Fn(usize, usize) -> C,
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
-        let mut rest = Buffer::of(self.pyramid_nodes());
+        let mut rest = Buffer::with_len(self.pyramid_nodes());
         let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
         for (number, nodes) in pyramids.filter(|(_, nodes)| !rows::is_zero(nodes)) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| wanted[*part]) {
                 if part == 0 {
-                    rows::add_changes_to_zero(change, nodes);
+                    dispatch!(add_changes_to_zero(change, nodes));
                 } else {
                     self.stages.refine(&vec![true; self.shape[3]], &mut rest, &mut decoding(number, part));
-                    rows::add_changes(change, nodes, &rest);
+                    dispatch!(add_changes(change, nodes, &rest[..]));
                 }
             }
         }
@@ -328,7 +331,7 @@ impl<'a> PredictionPasses<'a> {
     }
 
     fn step<R: Real>(&self, step: f64, pass: &Pass) -> R {
-        R::of(self.pyramid.step(step, pass.level))
+        R::from_f64(self.pyramid.step(step, pass.level))
     }
 
     /// The number of nodes in a pyramid.
@@ -343,7 +346,7 @@ impl<'a> PredictionPasses<'a> {
             let step = self.pyramid.step(step, pass.level);
             let first = start;
             start += pass.codes();
-            (first, [R::of(step), R::of(1.0 / step)])
+            (first, [R::from_f64(step), R::from_f64(1.0 / step)])
         };
         self.passes.iter().map(of_pass).collect()
     }

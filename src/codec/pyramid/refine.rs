@@ -22,22 +22,29 @@ pub(super) struct Rows {
 
 impl Rows {
     /// The rows along `axis` of a lattice of `extents` nodes whose axis gains `odds` nodes and keeps some.
-    pub(super) fn new(extents: [usize; 3], axis: usize, (odds, kept): (usize, usize)) -> Self {
+    pub(super) fn new(extents: [usize; 3], axis: usize, odds: usize, kept: usize) -> Self {
         let product = |extents: &[usize]| extents.iter().product();
         let (inner, outer) = (product(&extents[..axis]), product(&extents[axis + 1..]));
         Self { outer, inner, evens: extents[axis], odds, kept }
     }
 }
 
-/// Refines along any axis but the fastest, and corrects every odd row. `first` is the number, among all nodes that the
-/// pass adds, of the first one in this array.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+/// The nodes that a pass adds, from number `first` of them on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AddedNodes {
+    pub(super) pass: usize,
+    pub(super) first: usize,
+}
+
+/// Refines along any axis but the fastest, and corrects every odd row. `added` are the nodes in these rows.
+#[inline(always)]
 pub(super) fn refine_across<R: Real, C: Correction<R>>(
     stencil: Stencil,
     rows: &Rows,
     coarse: &[R],
     fine: &mut [R],
-    (pass, first, correction): (usize, usize, &mut C),
+    added: AddedNodes,
+    correction: &mut C,
 ) {
     let &Rows { outer, inner, evens, odds, kept } = rows;
     let apart = 1 + usize::from(odds > 0);
@@ -52,26 +59,27 @@ pub(super) fn refine_across<R: Real, C: Correction<R>>(
             let row = |t: usize| if t < taps.count { &from[(taps.first + t) * inner..][..inner] } else { &[] };
             let predicted = &mut to[(2 * i + 1) * inner..][..inner];
             taps.sum([row(0), row(1), row(2), row(3)], predicted);
-            correction.correct(pass, first + (part * odds + i) * inner, predicted);
+            correction.correct(added.pass, added.first + (part * odds + i) * inner, predicted);
         }
     }
 }
 
 /// Refines along the fastest axis, and corrects the odd nodes of every line.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn refine_lines<R: Real, C: Correction<R>>(
     stencil: Stencil,
     rows: &Rows,
     coarse: &[R],
     fine: &mut [R],
-    (pass, first, correction): (usize, usize, &mut C),
+    added: AddedNodes,
+    correction: &mut C,
 ) {
     let &Rows { outer, evens, odds, kept, .. } = rows;
     let mut odd = vec![R::default(); odds];
     for line in 0..outer {
         let even = &coarse[line * evens..][..evens];
         predict_line(stencil, even, &mut odd);
-        correction.correct(pass, first + line * odds, &mut odd);
+        correction.correct(added.pass, added.first + line * odds, &mut odd);
         let to = &mut fine[line * (kept + odds)..][..kept + odds];
         if odds == 0 {
             to.copy_from_slice(&even[..kept]);
@@ -89,7 +97,7 @@ pub(super) fn refine_lines<R: Real, C: Correction<R>>(
 /// Refines along time: predicts the odd slices of `slices` nodes each from the even ones, which are in place.
 ///
 /// Only the slices that `wanted` marks are predicted. A few nodes of all slices at a time stay in the cache.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn refine_slices<R: Real>(stencil: Stencil, slice: usize, wanted: &[bool], nodes: &mut [R]) {
     let evens = wanted.len().div_ceil(2);
     let mut predicted = [R::default(); NODES];
@@ -112,7 +120,7 @@ pub(super) fn refine_slices<R: Real>(stencil: Stencil, slice: usize, wanted: &[b
 const NODES: usize = 1024;
 
 /// Copies every n-th node of a line.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn gather<R: Real>(line: &[R], n: usize, out: &mut [R]) {
     if n == 2 && line.len() >= 2 * out.len() {
         for (to, pair) in out.iter_mut().zip(line.as_chunks::<2>().0) {

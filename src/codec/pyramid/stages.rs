@@ -5,8 +5,9 @@
 //! `[slice][z][y][x]` of the lattice at its current refinement. Before a pass along time, slices lie at even places.
 
 use super::corrections::Correction;
-use super::refine::{Rows, refine_across, refine_lines, refine_slices};
+use super::refine::{AddedNodes, Rows, refine_across, refine_lines, refine_slices};
 use super::stencil::taps;
+use crate::base::vectors::dispatch;
 use crate::codec::buffer::Buffer;
 use crate::codec::real::Real;
 use std::ops::Range;
@@ -60,7 +61,7 @@ impl Lattice {
         let rows = match (axis, before) {
             (Some(axis), Some(before)) if *axis != Axis::T => {
                 let (axis, odds) = (axis.index(), if added.contains(&0) { 0 } else { added[axis.index()] });
-                Rows::new(before.extents, axis, (odds, extents[axis] - odds))
+                Rows::new(before.extents, axis, odds, extents[axis] - odds)
             }
             _ => Rows::default(),
         };
@@ -133,35 +134,36 @@ impl Stages {
     /// `wanted` marks; others are unspecified.
     pub(super) fn refine<R: Real>(&self, wanted: &[bool], out: &mut [R], correction: &mut impl Correction<R>) {
         let needed = self.needed(wanted);
-        let mut coarse = Buffer::of(self.lattices[0].slice());
+        let mut coarse = Buffer::with_len(self.lattices[0].slice());
         coarse.fill(R::default());
         correction.correct(0, 0, &mut coarse);
         correction.complete(0, 0, &mut coarse);
         let Some((last, others)) = self.stages.split_last() else { return out.copy_from_slice(&coarse) };
         for (stage, needed) in others.iter().zip(&needed) {
             let fine = &self.lattices[stage.ends()[1]];
-            let mut nodes = Buffer::of(fine.slices * fine.slice());
-            self.refine_stage(stage, needed, (&coarse, &mut nodes), correction);
+            let mut nodes = Buffer::with_len(fine.slices * fine.slice());
+            self.refine_stage(stage, needed, &coarse, &mut nodes, correction);
             coarse = nodes;
         }
-        self.refine_stage(last, wanted, (&coarse, out), correction);
+        self.refine_stage(last, wanted, &coarse, out, correction);
     }
 
     fn refine_stage<R: Real>(
         &self,
         stage: &Stage,
         needed: &[bool],
-        (coarse, fine): (&[R], &mut [R]),
+        coarse: &[R],
+        fine: &mut [R],
         correction: &mut impl Correction<R>,
     ) {
         let [before, after] = stage.ends().map(|pass| self.lattices[pass].slice());
         let needed_before = self.needed_before(stage, needed);
         for (n, slice) in coarse.chunks_exact(before).enumerate().filter(|(n, _)| needed_before[*n]) {
             let to = &mut fine[n * stage.apart() * after..][..after];
-            self.refine_slice(stage, (n, slice, to), correction);
+            self.refine_slice(stage, n, slice, to, correction);
         }
         let Some(time) = stage.time else { return };
-        refine_slices(self.stencil, after, needed, fine);
+        dispatch!(refine_slices(self.stencil, after, needed, &mut *fine));
         for (n, slice) in fine.chunks_exact_mut(after).skip(1).step_by(2).enumerate() {
             if needed[2 * n + 1] {
                 correction.correct(time, n * after, slice);
@@ -174,28 +176,36 @@ impl Stages {
     fn refine_slice<R: Real>(
         &self,
         stage: &Stage,
-        (n, coarse, fine): (usize, &[R], &mut [R]),
+        n: usize,
+        coarse: &[R],
+        fine: &mut [R],
         correction: &mut impl Correction<R>,
     ) {
         let Some(last) = stage.spatial.clone().last() else { return fine.copy_from_slice(coarse) };
         let mut nodes: Option<Buffer<R>> = None;
         for pass in stage.spatial.start..last {
-            let mut finer = Buffer::of(self.lattices[pass].slice());
-            self.refine_pass(pass, (n, nodes.as_deref().unwrap_or(coarse), &mut finer), correction);
+            let mut finer = Buffer::with_len(self.lattices[pass].slice());
+            self.refine_pass(pass, n, nodes.as_deref().unwrap_or(coarse), &mut finer, correction);
             nodes = Some(finer);
         }
-        self.refine_pass(last, (n, nodes.as_deref().unwrap_or(coarse), fine), correction);
+        self.refine_pass(last, n, nodes.as_deref().unwrap_or(coarse), fine, correction);
     }
 
     fn refine_pass<R: Real>(
         &self,
         pass: usize,
-        (n, coarse, fine): (usize, &[R], &mut [R]),
+        n: usize,
+        coarse: &[R],
+        fine: &mut [R],
         correction: &mut impl Correction<R>,
     ) {
         let Lattice { rows, added, .. } = &self.lattices[pass];
-        let refine = if rows.inner == 1 { refine_lines } else { refine_across };
-        refine(self.stencil, rows, coarse, fine, (pass, n * added, correction));
+        let added = AddedNodes { pass, first: n * added };
+        if rows.inner == 1 {
+            dispatch!(refine_lines(self.stencil, rows, coarse, &mut *fine, added, &mut *correction));
+        } else {
+            dispatch!(refine_across(self.stencil, rows, coarse, &mut *fine, added, &mut *correction));
+        }
         correction.complete(pass, n, fine);
     }
 

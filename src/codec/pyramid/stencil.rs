@@ -16,7 +16,7 @@ impl Taps {
     /// Computes the weighted sum of rows, one for each tap, from the first tap to the last.
     #[inline(always)]
     pub(super) fn sum<R: Real>(&self, [a, b, c, d]: [&[R]; 4], out: &mut [R]) {
-        let [w, x, y, z] = self.weights.map(R::of);
+        let [w, x, y, z] = self.weights.map(R::from_f64);
         match self.count {
             4 => rows::sum4([a, b, c, d], [w, x, y, z], out),
             3 => rows::sum3([a, b, c], [w, x, y], out),

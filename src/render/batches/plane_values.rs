@@ -2,6 +2,7 @@
 
 use crate::base::error::Result;
 use crate::base::sample::{SampleType, load_as};
+use crate::base::vectors::dispatch;
 use crate::codec::field::Plane;
 use crate::codec::real::Real;
 
@@ -36,14 +37,14 @@ impl PlaneValues<'_> {
     pub(in crate::render) fn add_to(&self, factor: f64, sums: &mut [f64]) {
         match self {
             Self::Nothing => {}
-            Self::Single(values) => add_scaled(values, factor, sums),
-            Self::Double(values) => add_scaled(values, factor, sums),
+            Self::Single(values) => dispatch!(add_scaled(values, factor, sums)),
+            Self::Double(values) => dispatch!(add_scaled(values, factor, sums)),
             Self::Few(values) => values.iter().for_each(|(voxel, value)| sums[*voxel as usize] += factor * value),
         }
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_scaled<R: Real>(values: &[R], factor: f64, sums: &mut [f64]) {
     sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += factor * value.to_f64());
 }

@@ -8,6 +8,7 @@ use super::units::Units;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Region};
 use crate::base::progress::Progress;
+use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane};
 
 /// Reads the samples of a batch's blocks.
@@ -86,8 +87,8 @@ fn in_units(plane: &PlaneValues<'_>, voxels: usize, units: &Units) -> Vec<f32> {
     let mut out = vec![units.number(0.0); voxels];
     match plane {
         PlaneValues::Nothing => {}
-        PlaneValues::Single(values) => convert(values, *units, &mut out),
-        PlaneValues::Double(values) => convert(values, *units, &mut out),
+        PlaneValues::Single(values) => dispatch!(convert(values, *units, &mut out[..])),
+        PlaneValues::Double(values) => dispatch!(convert(values, *units, &mut out[..])),
         PlaneValues::Few(values) => {
             values.iter().for_each(|(voxel, value)| out[*voxel as usize] = units.number(*value));
         }
@@ -95,7 +96,7 @@ fn in_units(plane: &PlaneValues<'_>, voxels: usize, units: &Units) -> Vec<f32> {
     out
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn convert<T: Copy + Into<f64>>(values: &[T], units: Units, out: &mut [f32]) {
     out.iter_mut().zip(values).for_each(|(out, value)| *out = units.number((*value).into()));
 }

@@ -89,7 +89,7 @@ impl RenderConfig {
         Self {
             mode: Mode::Projection,
             views: vec![view],
-            kernel: Kernel::of_grid(scene.grid()),
+            kernel: Kernel::for_grid(scene.grid()),
             quantity: Quantity::Mean,
             frames: (0..scene.frames().unwrap_or(0)).collect(),
             paired: false,

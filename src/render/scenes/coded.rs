@@ -114,7 +114,7 @@ fn coefficients<'a>(
 ) -> PlaneValues<'a> {
     match field {
         Some(field) => field.plane(k, block.voxels, &mut scratch.double).into(),
-        None => block.plane(&plan.codec, k, (&mut scratch.single, &mut scratch.double)).into(),
+        None => block.plane(&plan.codec, k, &mut scratch.single, &mut scratch.double).into(),
     }
 }
 

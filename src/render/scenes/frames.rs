@@ -4,7 +4,8 @@ use super::overview;
 use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::progress::Progress;
-use crate::base::sample::{self, is_missing, magnitude};
+use crate::base::sample::{self, is_any_missing, is_missing, magnitude};
+use crate::base::vectors::dispatch;
 use crate::colour::TransferFunction;
 use crate::render::batches::{
     BatchOutcome, BatchRequest, BlockPlanes, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest, PlaneValues,
@@ -198,7 +199,7 @@ impl FrameBatch for SampleBatch<'_> {
 
 impl SampleBatch<'_> {
     fn note_missing<T: Copy + Into<f64>>(&self, values: &[T]) {
-        if let Some(found) = self.unexpected.filter(|_| sample::is_any_missing(values, self.missing_value)) {
+        if let Some(found) = self.unexpected.filter(|_| dispatch!(is_any_missing(values, self.missing_value))) {
             found.store(true, Relaxed);
         }
     }

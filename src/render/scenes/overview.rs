@@ -75,7 +75,7 @@ fn decode_window(
     progress: &dyn Progress,
 ) -> Result<()> {
     let (window, codec, frames) = coarse(file, request, frames)?;
-    let decode = |entry: &BlockEntry| file.coarse(&codec, entry, (request.thinning.stride, &frames));
+    let decode = |entry: &BlockEntry| file.coarse(&codec, entry, request.thinning.stride, &frames);
     for entries in file.entries(window, channel, &request.region) {
         let entries = entries?;
         for some in entries.chunks(TOGETHER) {

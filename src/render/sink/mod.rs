@@ -291,7 +291,7 @@ impl Sink {
             return Ok(vec![path.into()]);
         }
         let names = Numbered::new(path, frames.len())?;
-        Ok(frames.iter().map(|frame| names.of(*frame)).collect())
+        Ok(frames.iter().map(|frame| names.path(*frame)).collect())
     }
 
     /// Writes the picture that the sink shows of a frame, if there is one.
@@ -320,7 +320,7 @@ impl Sink {
                 }
             }
             Target::Many(names) => {
-                let path = names.of(frame);
+                let path = names.path(frame);
                 let mut out = Output::create(&path, config.may_replace(&path))?;
                 stream::write(config, rendered, picture, &mut out).map_err(|e| Error::io(&path, "writing", e))?;
                 out.commit()

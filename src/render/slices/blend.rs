@@ -6,6 +6,7 @@ use super::row::{Blend, Point, Row};
 use super::shade::{Lit, Shader};
 use super::table::{ENTRIES, Table};
 use super::view::SlicedView;
+use crate::base::vectors::dispatch;
 use crate::colour::TransferFunction;
 use crate::render::batches::Units;
 use crate::render::light::Light;
@@ -75,8 +76,8 @@ impl Blend for Composite {
 
     fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]) {
         match &self.shader {
-            Some(shader) => add_shaded(row, &self.table.entries, shader, groups, limits),
-            None => add(row, &self.table.entries, groups, limits),
+            Some(shader) => dispatch!(add_shaded(row, &self.table.entries, shader, groups, limits)),
+            None => dispatch!(add(row, &self.table.entries, groups, limits)),
         }
     }
 
@@ -135,7 +136,7 @@ pub(super) fn off_light(exact: &[f64; 4], pixel: &[f32]) -> f64 {
     off.fold(0.0, f64::max)
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add(row: &Row<'_>, entries: &[[f32; 8]; ENTRIES], groups: &mut [[[f32; 4]; GROUP]], limits: &mut [f32]) {
     for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate() {
         if !row.live[n] {
@@ -151,7 +152,7 @@ fn add(row: &Row<'_>, entries: &[[f32; 8]; ENTRIES], groups: &mut [[[f32; 4]; GR
 }
 
 /// The same as [`add`] with light on the colours (eq 42).
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_shaded(
     row: &Row<'_>,
     entries: &[[f32; 8]; ENTRIES],

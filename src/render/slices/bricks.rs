@@ -15,7 +15,7 @@ pub(super) struct Ranges {
 
 /// The ranges of a layer's bricks, and whether any sample is missing. The first `columns` numbers of each row are
 /// samples.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn ranges(layer: &[f32], (stride, columns): (usize, usize)) -> (Ranges, bool) {
     let (mut found, mut any) = (Ranges { columns: stride / GROUP, ..Ranges::default() }, false);
     for rows in layer.chunks(stride * BRICK_ROWS) {
@@ -86,13 +86,14 @@ impl Ranges {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::vectors::dispatch;
 
     #[test]
     fn ranges_hold_every_sample_and_no_padding() {
         let (stride, columns, rows) = (32, 19, 11);
         let value = |i: usize| if i % 13 == 5 { f32::NAN } else { ((i * 7919) % 101) as f32 + 1.0 };
         let layer: Vec<f32> = (0..stride * rows).map(|i| if i % stride < columns { value(i) } else { 0.0 }).collect();
-        let (found, missing) = ranges(&layer, (stride, columns));
+        let (found, missing) = dispatch!(ranges(&layer[..], (stride, columns)));
         assert!(missing && found.columns == 2 && found.least.len() == 4);
         for brick in 0..4 {
             let inside =
@@ -103,6 +104,6 @@ mod tests {
         }
         let wide = found.dilated(1);
         assert_eq!(wide.joined(0..1, 0..2), found.joined(0..2, 0..2));
-        assert!(!ranges(&vec![1.0; stride * rows], (stride, columns)).1);
+        assert!(!dispatch!(ranges(&vec![1.0; stride * rows][..], (stride, columns))).1);
     }
 }

@@ -12,6 +12,7 @@
 use super::GROUP;
 use super::filter::Sixteen;
 use super::view::SlicedView;
+use crate::base::vectors::dispatch;
 
 /// The field at a point of a ray.
 #[derive(Debug, Clone, Copy)]
@@ -132,7 +133,7 @@ impl Rays {
     /// Marks the cells in which one of the surfaces may show between two slices.
     pub(super) fn near(&self, values: &[f32], from: &Slope, to: &Slope) -> [bool; GROUP] {
         values.iter().fold([false; GROUP], |marked, value| {
-            let near = near(from, to, *value, self);
+            let near = dispatch!(near(from, to, *value, self));
             std::array::from_fn(|i| marked[i] || near[i])
         })
     }
@@ -184,7 +185,7 @@ fn turning_value(from: &CoverPoint, to: &CoverPoint, rises: [f32; 2], share: f32
 }
 
 /// Whether a value may be passed, or almost reached, between two slices.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn near(from: &Slope, to: &Slope, value: f32, rays: &Rays) -> [bool; GROUP] {
     let mut marks = [false; GROUP];
     for (i, mark) in marks.iter_mut().enumerate() {

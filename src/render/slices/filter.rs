@@ -32,7 +32,7 @@ impl AxisSums {
 
 /// Stores the weighted sums of a strip of several layers. Layers may be one array from several first numbers on, so
 /// this filters along any axis.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn mix(layers: &[&[f32]], weights: &[f32], from: Strip, rows: usize, (to, out): (Strip, &mut [f32])) {
     for row in 0..rows {
         let sum = weighted(layers.iter().copied(), weights, from.at + row * from.stride);
@@ -42,7 +42,7 @@ pub(super) fn mix(layers: &[&[f32]], weights: &[f32], from: Strip, rows: usize, 
 
 /// The same with zeros for missing samples; and the sums of the weights of samples that are present, where `mask` is 1
 /// for columns with samples.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 pub(super) fn mix_present(
     layers: &[&[f32]],
     weights: &[f32],

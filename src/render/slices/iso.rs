@@ -8,6 +8,7 @@ use super::cover::{CoverPoint, Rays, Slope};
 use super::row::{Blend, Point, Row};
 use super::shade::Shader;
 use super::view::SlicedView;
+use crate::base::vectors::dispatch;
 use crate::render::batches::Units;
 use crate::render::light::{Light, Surface};
 
@@ -107,7 +108,7 @@ impl Blend for Isosurfaces {
 
     fn add(&self, row: &Row<'_>, groups: &mut [Front], limits: &mut [f32]) {
         for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate().filter(|(n, _)| row.live[*n]) {
-            let next = slope(row, n);
+            let next = dispatch!(slope(row, n));
             let follows = group.slice.wrapping_add(1) == row.slice;
             let marked = if follows { self.rays.near(&self.values, &group.last, &next) } else { [false; GROUP] };
             if marked.contains(&true) {
@@ -157,7 +158,7 @@ impl Blend for Isosurfaces {
 }
 
 /// The field at a group of cells.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn slope(row: &Row<'_>, group: usize) -> Slope {
     if row.is_whole(group) {
         return Slope { values: row.sums(group), gradient: row.gradient(group, None) };

@@ -3,11 +3,12 @@
 //! Samples are in the units of the table or of the largest value ([`crate::render::batches::Units`]). NaN is missing. Rows run along b and are
 //! padded with zeros to whole bricks.
 
-use super::bricks::{self, Ranges};
+use super::bricks::{Ranges, ranges};
 use super::taps::along;
 use super::view::SlicedView;
 use super::{BRICK_ROWS, GROUP};
 use crate::base::grid::Region;
+use crate::base::vectors::dispatch;
 
 /// Some voxel layers of one frame, counted along the ray.
 #[derive(Debug)]
@@ -84,7 +85,7 @@ impl Layers {
     /// Finds the ranges of the bricks of new layers. All their voxels must be in place.
     pub(super) fn seal(&mut self, columns: usize) {
         for layer in self.first + self.ranges.len()..self.end {
-            let (ranges, missing) = bricks::ranges(self.layer(layer), (self.stride, columns));
+            let (ranges, missing) = dispatch!(ranges(self.layer(layer), (self.stride, columns)));
             self.ranges.push(ranges);
             self.missing.push(missing);
         }

@@ -4,6 +4,7 @@
 use super::GROUP;
 use super::filter::Sixteen;
 use super::row::{Blend, Point, Row};
+use crate::base::vectors::dispatch;
 use crate::render::batches::Units;
 
 /// The maximum along the ray.
@@ -56,7 +57,7 @@ impl Blend for Largest {
     }
 
     fn add(&self, row: &Row<'_>, groups: &mut [Peaks], limits: &mut [f32]) {
-        add(row, groups, limits);
+        dispatch!(add(row, groups, limits));
     }
 
     fn cells(group: &Peaks) -> Sixteen {
@@ -111,7 +112,7 @@ fn nearest(inner: [f32; 4], across: [f32; 4], down: [f32; 4]) -> f32 {
     best.filter(|n| near(*n) >= 0.25).map_or(NONE, |n| inner[n])
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add(row: &Row<'_>, groups: &mut [Peaks], limits: &mut [f32]) {
     for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate() {
         if !row.live[n] {

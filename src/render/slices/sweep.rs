@@ -8,6 +8,7 @@ use super::stops::are_over;
 use super::taps::Taps;
 use super::view::{Slice, SlicedView};
 use super::{BRICK_ROWS, GROUP, LEAST};
+use crate::base::vectors::dispatch;
 use std::ops::Range;
 
 /// A band of rows of the lattice of one frame.
@@ -148,9 +149,9 @@ impl<B: Blend> Band<'_, B> {
                 for (sums, weights) in self.scratch.along_a.iter_mut().zip([part.weights, part.slopes]) {
                     if part.has_missing {
                         let mask = std::array::from_fn(|i| f32::from(u8::from(column * GROUP + i < view.count[0])));
-                        mix_present(&part.layers, weights, from, &mask, rows, to, sums);
+                        dispatch!(mix_present(&part.layers[..], weights, from, &mask, rows, to, sums));
                     } else {
-                        mix(&part.layers, weights, from, rows, (to, &mut sums.values));
+                        dispatch!(mix(&part.layers[..], weights, from, rows, (to, &mut sums.values[..])));
                     }
                 }
             }
@@ -184,9 +185,9 @@ impl<B: Blend> Band<'_, B> {
                 let out = Strip { at: first * to + group * GROUP, stride: to };
                 for (sums, (source, weights)) in sums.iter_mut().zip(kinds) {
                     let [values, present] = &sources[source];
-                    mix(values, weights, strip, rows, (out, &mut sums.values));
+                    dispatch!(mix(&values[..], weights, strip, rows, (out, &mut sums.values[..])));
                     if part.has_missing {
-                        mix(present, weights, strip, rows, (out, &mut sums.present));
+                        dispatch!(mix(&present[..], weights, strip, rows, (out, &mut sums.present[..])));
                     }
                 }
             }

@@ -9,6 +9,7 @@ use super::sparse_terms::SparseTerms;
 use super::tile_rect::{TileRect, intersect, overlap};
 use super::view_setup::ViewSetup;
 use crate::base::error::Result;
+use crate::base::vectors::dispatch;
 use crate::render::batches::{BlockAdder, BlockPlanes, Order};
 use crate::view::footprint::Footprint;
 use crate::wavelet::Lane;
@@ -133,7 +134,7 @@ impl Tile {
         let TileRect { x: xs, y: ys } = &self.rect;
         let (width, pixels) = (xs.len(), self.rect.pixels());
         let start = plane * pixels + (y - ys.start) * width + (x - xs.start);
-        add_to_plane(&mut self.sums[start..], width, value, row, column);
+        dispatch!(add_to_plane(&mut self.sums[start..], width, value, row, column));
     }
 
     /// Adds a value for every plane, as [`Self::add`] does for one.
@@ -141,12 +142,12 @@ impl Tile {
         let TileRect { x: xs, y: ys } = &self.rect;
         let width = xs.len();
         let start = ((y - ys.start) * width + (x - xs.start)) * self.count;
-        add_to_pixels(&mut self.sums[start..], width, values, row, column);
+        dispatch!(add_to_pixels(&mut self.sums[start..], width, values, row, column));
     }
 }
 
 /// Adds `value` times the outer product of a row and a column to a plane whose rows are `width` pixels apart.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_to_plane(sums: &mut [f64], width: usize, value: f64, row: &[f64], column: &[f64]) {
     for (weight, line) in column.iter().zip(sums.chunks_mut(width)) {
         let factor = value * weight;
@@ -157,7 +158,7 @@ fn add_to_plane(sums: &mut [f64], width: usize, value: f64, row: &[f64], column:
 }
 
 /// The same with a value for each of a pixel's planes, which are interleaved.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_to_pixels(sums: &mut [f64], width: usize, values: &[f64], row: &[f64], column: &[f64]) {
     let count = values.len();
     let mut factors = vec![0.0; count];

@@ -143,7 +143,7 @@ impl<'a> ReferenceWeights<'a> {
         let near = around(centre, std::f64::consts::SQRT_2 * reach / squared.sqrt(), all);
         voxel[self.shear.axes[0]] = near.start;
         let (off, z) = (self.off(voxel, point), self.shear.depth(voxel));
-        self.footprint.sum_of_row(off, z, ([bx, by], self.shear.depths[0]), near.len())
+        self.footprint.sum_of_row(off, z, [bx, by], self.shear.depths[0], near.len())
     }
 
     /// The offset from a point of the picture to a voxel, in pixels.

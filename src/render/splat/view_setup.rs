@@ -113,7 +113,7 @@ mod tests {
         let config = RenderConfig {
             mode: Mode::Projection,
             views: vec![view],
-            kernel: Kernel::of_grid(&grid),
+            kernel: Kernel::for_grid(&grid),
             quantity,
             frames: vec![0],
             paired: false,

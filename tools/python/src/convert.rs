@@ -141,7 +141,7 @@ pub(crate) fn merge(
     job::run(py, report_to.as_ref(), |progress, _| {
         let shards = Shards::open(&shards, false, progress)?;
         let (mut out, begun) = resume::open(&path, overwrite, IfUnfinished::from_flags(overwrite, resume))?;
-        let report = shards.merge(begun, false, (&path, &mut out), progress)?;
+        let report = shards.merge(begun, false, &path, &mut out, progress)?;
         out.commit_if(resume::check)?;
         Ok(serde_json::to_string(&report).unwrap_or_default())
     })

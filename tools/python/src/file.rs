@@ -168,7 +168,7 @@ impl File {
 
     /// What is promised, as JSON.
     fn promise(&self) -> String {
-        serde_json::to_string(&BoundReport::of(self.file.metadata())).unwrap_or_default()
+        serde_json::to_string(&BoundReport::from_metadata(self.file.metadata())).unwrap_or_default()
     }
 
     /// The largest error of any sample.

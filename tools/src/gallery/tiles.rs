@@ -154,7 +154,7 @@ impl Tile {
     pub(super) fn image(&self, picture: &[f32], side: usize) -> Result<Image> {
         let numbers = picture.len() / (side * side);
         let range = if numbers == 1 { self.range(picture) } else { (0.0, 1.0) };
-        let clear = Clear::of_empty(&Distribution::new(picture.to_vec()), range)
+        let clear = Clear::empty_space(&Distribution::new(picture.to_vec()), range)
             .filter(|_| numbers == 1 && self.norm == Norm::Linear);
         let scale = Scale::new(&self.map, range, self.norm, BACKGROUND)?.with_clear(clear.map(|(clear, _)| clear));
         let pixels = picture.chunks_exact(numbers).map(|pixel| scale.colour_of_pixel(pixel)).collect();

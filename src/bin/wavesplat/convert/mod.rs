@@ -122,7 +122,7 @@ impl ConvertArgs {
         self.check_output()?;
         let mut out = Output::create(&self.output, self.force)?;
         let progress = self.common.progress("convert", "blocks");
-        let report = repack(file, (self.level, self.common.memory.0), &self.output, &mut out, &progress)?;
+        let report = repack(file, self.level, self.common.memory.0, &self.output, &mut out, &progress)?;
         out.commit_if(resume::check)?;
         let RepackReport { frames, input_bytes, output_bytes, .. } = report;
         self.common.note(format_args!("{frames} frames, {input_bytes} -> {output_bytes} bytes, with the same samples"));

@@ -92,7 +92,7 @@ impl Info {
             dates: times.dates(),
             span: times.span(),
             variable: m.variable.clone(),
-            promise: BoundReport::of(m),
+            promise: BoundReport::from_metadata(m),
             range: range_of_shares(m),
             delta: largest_bound(m),
             value_range: file.value_range(),

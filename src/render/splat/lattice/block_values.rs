@@ -1,5 +1,6 @@
 //! The values of a block in one plane, ready to be summed in f32.
 
+use crate::base::vectors::dispatch;
 use crate::codec::real::Real;
 
 /// The values v of a block as `middle` + `scale` times numbers that sums in f32 can hold.
@@ -27,7 +28,7 @@ pub(super) fn fits_single(value: f64) -> bool {
 impl<'a, R: Real> BlockValues<'a, R> {
     /// Finds the middle and the scale of values, none of which is NaN.
     pub(super) fn new(values: &'a [R]) -> Self {
-        let [least, most] = range(values).map(Real::to_f64);
+        let [least, most] = dispatch!(range(values)).map(Real::to_f64);
         let largest = most.max(-least);
         let middle = if largest > MOST_RANGES * (most - least) { 0.5 * least + 0.5 * most } else { 0.0 };
         let largest = if middle == 0.0 { largest } else { 0.5 * most - 0.5 * least };
@@ -40,8 +41,8 @@ impl<'a, R: Real> BlockValues<'a, R> {
     #[inline(always)]
     pub(super) fn load_row<S: Real>(&self, first: usize, step: usize, row: &mut [S]) {
         let values = &self.values[first..];
-        let number = |value: &R| S::of(value.to_f64());
-        let scaled = |value: &R| S::of((value.to_f64() - self.middle) / self.scale);
+        let number = |value: &R| S::from_f64(value.to_f64());
+        let scaled = |value: &R| S::from_f64((value.to_f64() - self.middle) / self.scale);
         match (self.middle == 0.0 && self.scale == 1.0, step) {
             (true, 1) => row.iter_mut().zip(values).for_each(|(to, value)| *to = number(value)),
             (true, _) => row.iter_mut().zip(values.iter().step_by(step)).for_each(|(to, value)| *to = number(value)),
@@ -51,7 +52,7 @@ impl<'a, R: Real> BlockValues<'a, R> {
 }
 
 /// The least and the largest value; zeros without values.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn range<R: Real>(values: &[R]) -> [R; 2] {
     const LANES: usize = 16;
     let Some(first) = values.first() else { return [R::default(); 2] };

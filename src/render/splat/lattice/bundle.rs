@@ -159,7 +159,7 @@ fn side_by_side<R: Real>(
     let places = places(stored.len());
     let mut cells = vec![R::default(); tile.size[0] * tile.size[1] * places];
     for (at, cell) in cells.chunks_exact_mut(places).enumerate() {
-        (0..stored.len()).for_each(|n| cell[n] = R::of(number(n, at)));
+        (0..stored.len()).for_each(|n| cell[n] = R::from_f64(number(n, at)));
     }
     let planes = stored.iter().copied().enumerate().collect();
     Bundle { planes, places, stride: tile.size[0], window: *tile, cells: Cow::Owned(cells) }
@@ -172,7 +172,7 @@ pub(super) fn weighted<R: Real, const N: usize>(cells: &[[R; N]], stride: usize,
     let (mut even, mut odd) = ([R::default(); N], [R::default(); N]);
     let (pairs, rest) = weights.as_chunks::<2>();
     for (n, pair) in pairs.iter().enumerate() {
-        let (a, b) = (R::of(f64::from(pair[0])), R::of(f64::from(pair[1])));
+        let (a, b) = (R::from_f64(f64::from(pair[0])), R::from_f64(f64::from(pair[1])));
         let (first, second) = (&cells[2 * n * stride], &cells[(2 * n + 1) * stride]);
         for i in 0..N {
             even[i] = even[i] + a * first[i];
@@ -180,7 +180,7 @@ pub(super) fn weighted<R: Real, const N: usize>(cells: &[[R; N]], stride: usize,
         }
     }
     if let [last] = rest {
-        let (weight, cell) = (R::of(f64::from(*last)), &cells[2 * pairs.len() * stride]);
+        let (weight, cell) = (R::from_f64(f64::from(*last)), &cells[2 * pairs.len() * stride]);
         for i in 0..N {
             even[i] = even[i] + weight * cell[i];
         }

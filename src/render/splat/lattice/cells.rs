@@ -1,6 +1,7 @@
 //! The cells (eq 35) of a band of a picture, with planes of sums.
 
 use super::filtered::TOGETHER;
+use crate::base::vectors::dispatch;
 use crate::base::zeroed::Zeroed;
 use crate::codec::real::Real;
 use std::ops::Range;
@@ -214,13 +215,17 @@ impl CellPlane<'_> {
     /// Adds `scale` times the cells of another rectangle to the sums in f32.
     pub(super) fn add_single(&mut self, rectangle: &Rectangle, sums: &[f32], scale: f32) {
         let own = self.rectangle;
-        add_rectangle(&own, self.single(), rectangle, sums, |to, from| add_scaled_single(to, from, scale));
+        add_rectangle(&own, self.single(), rectangle, sums, |to, from| {
+            dispatch!(add_scaled_single(to, from, scale));
+        });
     }
 
     /// Adds `scale` times the cells of another rectangle to the sums in f64.
     pub(super) fn add_double<R: Real>(&mut self, rectangle: &Rectangle, sums: &[R], scale: f64) {
         let own = self.rectangle;
-        add_rectangle(&own, self.double(), rectangle, sums, |to, from| add_scaled_double(to, from, scale));
+        add_rectangle(&own, self.double(), rectangle, sums, |to, from| {
+            dispatch!(add_scaled_double(to, from, scale));
+        });
     }
 }
 
@@ -242,12 +247,12 @@ fn add_rectangle<S, R>(
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_scaled_single(sums: &mut [f32], more: &[f32], scale: f32) {
     sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += scale * more);
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_scaled_double<R: Real>(sums: &mut [f64], more: &[R], scale: f64) {
     sums.iter_mut().zip(more).for_each(|(sum, more)| *sum += scale * more.to_f64());
 }

@@ -2,6 +2,7 @@
 
 use super::cells::{Aligned, Cells, LINE, PlaneSums, Rectangle};
 use super::prefilter::{HALF, Taps};
+use crate::base::vectors::dispatch;
 use crate::base::zeroed::Zeroed;
 use crate::codec::real::Real;
 use rayon::prelude::*;
@@ -140,7 +141,7 @@ fn filter_all_rows(rectangle: &Rectangle, plane: &Rows<'_, f64>, taps: &Taps) ->
 impl<'a, R: Real> Rows<'a, R> {
     /// Puts the cells of all phases of a plane side by side, and filters them along u.
     fn new(rectangle: &Rectangle, number: usize, sums: &'a mut [R], taps: &Taps) -> Self {
-        let (width, taps) = (rectangle.size[0], taps.map(R::of));
+        let (width, taps) = (rectangle.size[0], taps.map(R::from_f64));
         let mut wide = vec![R::default(); width + 2 * HALF];
         let of_row = |row: &mut [R]| {
             interleave(row, rectangle, &mut wide[HALF..][..width]);
@@ -148,7 +149,7 @@ impl<'a, R: Real> Rows<'a, R> {
             if span.is_empty() {
                 return span;
             }
-            filter_along(&wide, &taps, row);
+            dispatch!(filter_along(&wide[..], &taps, &mut *row));
             span.start.saturating_sub(HALF)..(span.end + HALF).min(width)
         };
         let spans = sums.chunks_exact_mut(width.max(1)).map(of_row).collect();
@@ -180,14 +181,14 @@ impl<'a, R: Real> Rows<'a, R> {
         let missing = v < HALF || row(Some(v + HALF)).is_none();
         let zeros = if missing { vec![R::default(); width] } else { Vec::new() };
         let at = |v: Option<usize>| row(v).unwrap_or(&zeros);
-        filter_across(std::array::from_fn(|n| at((v + n).checked_sub(HALF))), taps, out);
+        dispatch!(filter_across(std::array::from_fn(|n| at((v + n).checked_sub(HALF))), taps, out));
     }
 }
 
 /// Puts the cells of all phases of a row side by side.
 fn interleave<R: Real>(from: &[R], rectangle: &Rectangle, to: &mut [R]) {
     match rectangle.phases {
-        2 => interleave_two(from, rectangle.run, to),
+        2 => dispatch!(interleave_two(from, rectangle.run, to)),
         phases => {
             for (phase, run) in from.chunks_exact(rectangle.run).enumerate() {
                 to[phase..].iter_mut().step_by(phases).zip(run).for_each(|(to, from)| *to = *from);
@@ -196,7 +197,7 @@ fn interleave<R: Real>(from: &[R], rectangle: &Rectangle, to: &mut [R]) {
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn interleave_two<R: Real>(from: &[R], run: usize, to: &mut [R]) {
     let (even, odd) = from[..2 * run].split_at(run);
     for ((to, even), odd) in to.as_chunks_mut::<2>().0.iter_mut().zip(even).zip(odd) {
@@ -215,14 +216,14 @@ fn span<R: Real>(numbers: &[R]) -> Range<usize> {
 }
 
 /// Filters a row, which has [`HALF`] more cells on both sides.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn filter_along<R: Real>(row: &[R], taps: &[R; HALF + 1], to: &mut [R]) {
     let width = to.len();
     sum_of_products(std::array::from_fn(|n| &row[n..][..width]), taps, to);
 }
 
 /// Filters the middle one of 2 [`HALF`] + 1 rows.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn filter_across<R: Real>(rows: [&[R]; 2 * HALF + 1], taps: &[R; HALF + 1], to: &mut [R]) {
     sum_of_products(rows, taps, to);
 }

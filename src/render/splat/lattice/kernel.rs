@@ -17,6 +17,7 @@
 
 use super::axis::{PHASES, Phases, VECTOR, half, interpolated, split};
 use super::shear::Shear;
+use crate::base::vectors::dispatch;
 use std::ops::Range;
 
 /// The kernel of a view.
@@ -124,7 +125,7 @@ impl Kernel {
 
     /// Computes the weights of a pixel at `position` (eq 37).
     pub(super) fn weights(&self, position: [f64; 2], out: &mut Weights) {
-        fill(self, position, out);
+        dispatch!(fill(self, position, out));
     }
 }
 
@@ -200,7 +201,7 @@ impl Weights {
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn fill(kernel: &Kernel, [u, v]: [f64; 2], out: &mut Weights) {
     let ((u, s), (v, t)) = (split(u), split(v));
     out.first = [u + 1 - kernel.half[0] as isize, v + 1 - kernel.half[1] as isize];

@@ -4,6 +4,7 @@ use super::bundle::{Bundle, weighted};
 use super::filtered::TOGETHER;
 use super::kernel::{Kernel, Weights};
 use super::picture::Lattice;
+use crate::base::vectors::dispatch;
 use crate::codec::real::Real;
 use crate::wavelet::LANES;
 
@@ -28,17 +29,17 @@ impl OnePass {
     /// The sums of a bundle at the pixels.
     pub(super) fn sum<R: Real>(&self, bundle: &Bundle<'_, R>, sums: &mut [[R; TOGETHER]]) {
         match bundle.places {
-            1 => add_pixels::<R, 1>(&self.weights, bundle, sums),
-            2 => add_pixels::<R, 2>(&self.weights, bundle, sums),
-            4 => add_pixels::<R, 4>(&self.weights, bundle, sums),
-            8 => add_pixels::<R, 8>(&self.weights, bundle, sums),
-            _ => add_pixels::<R, TOGETHER>(&self.weights, bundle, sums),
+            1 => dispatch!(add_pixels::<R, 1>(&self.weights[..], bundle, sums)),
+            2 => dispatch!(add_pixels::<R, 2>(&self.weights[..], bundle, sums)),
+            4 => dispatch!(add_pixels::<R, 4>(&self.weights[..], bundle, sums)),
+            8 => dispatch!(add_pixels::<R, 8>(&self.weights[..], bundle, sums)),
+            _ => dispatch!(add_pixels::<R, TOGETHER>(&self.weights[..], bundle, sums)),
         }
     }
 }
 
 /// The sums of `N` planes side by side, row by row, so that rounding grows with rows and not with cells.
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_pixels<R: Real, const N: usize>(weights: &[Weights], bundle: &Bundle<'_, R>, sums: &mut [[R; TOGETHER]]) {
     let ([width, height], first) = (bundle.window.size.map(|n| n as isize), bundle.window.first);
     let cells = bundle.cells.as_chunks::<N>().0;

@@ -11,6 +11,7 @@ use super::cells::{Aligned, CellPlane, LINE, Rectangle};
 use super::shear::Shear;
 use super::spline::{MOST_DEGREE, Spread, spread};
 use crate::base::grid::Region;
+use crate::base::vectors::dispatch;
 use crate::codec::real::Real;
 use crate::render::batches::PlaneValues;
 use std::ops::Range;
@@ -147,7 +148,7 @@ impl Placed {
             sums = sums.resized(area);
         }
         sums.fill(S::default());
-        add_block(self, values, &mut sums, scratch);
+        dispatch!(add_block(self, values, &mut sums[..], scratch));
         sums
     }
 
@@ -214,7 +215,7 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
     Rectangle::holding([u.0, v.0], [u.1, v.1], q)
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_block<R: Real, S: Real>(
     placed: &Placed,
     values: &BlockValues<'_, R>,
@@ -303,7 +304,7 @@ const LAST: usize = 63;
 /// Multiplies a row by its fading.
 #[inline(always)]
 fn fade<S: Real>(row: &mut [S], scale: f64, fading: &[f64]) {
-    row.iter_mut().zip(fading).for_each(|(value, fading)| *value = *value * S::of(scale * fading));
+    row.iter_mut().zip(fading).for_each(|(value, fading)| *value = *value * S::from_f64(scale * fading));
 }
 
 /// A bit for each line of a row that is not zero.
@@ -357,7 +358,7 @@ fn add_rows<S: Real, const Q: usize, const TAPS: usize>(
 fn by_phase<S: Real, const Q: usize, const TAPS: usize>(weights: &Spread) -> [[S; TAPS]; Q] {
     let mut of_phases = [[S::default(); TAPS]; Q];
     for (phase, taps) in of_phases.iter_mut().enumerate() {
-        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = S::of(*weight));
+        taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = S::from_f64(*weight));
     }
     of_phases
 }

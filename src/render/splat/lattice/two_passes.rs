@@ -4,6 +4,7 @@
 use super::bundle::{Bundle, Bundles, weighted};
 use super::filtered::{TOGETHER, Window};
 use super::product::Product;
+use crate::base::vectors::dispatch;
 use crate::codec::real::Real;
 use crate::render::splat::tile_rect::TileRect;
 use std::ops::Range;
@@ -88,11 +89,11 @@ impl<'a> TwoPasses<'a> {
 
 fn sum_columns<R: Real>(bundle: &Bundle<'_, R>, columns: &Columns<'_>, sums: &mut [R]) {
     match bundle.places {
-        1 => add_columns::<R, 1>(bundle, columns, sums),
-        2 => add_columns::<R, 2>(bundle, columns, sums),
-        4 => add_columns::<R, 4>(bundle, columns, sums),
-        8 => add_columns::<R, 8>(bundle, columns, sums),
-        _ => add_columns::<R, TOGETHER>(bundle, columns, sums),
+        1 => dispatch!(add_columns::<R, 1>(bundle, columns, sums)),
+        2 => dispatch!(add_columns::<R, 2>(bundle, columns, sums)),
+        4 => dispatch!(add_columns::<R, 4>(bundle, columns, sums)),
+        8 => dispatch!(add_columns::<R, 8>(bundle, columns, sums)),
+        _ => dispatch!(add_columns::<R, TOGETHER>(bundle, columns, sums)),
     }
 }
 
@@ -107,7 +108,7 @@ struct Columns<'a> {
     cells: usize,
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_columns<R: Real, const N: usize>(bundle: &Bundle<'_, R>, columns: &Columns<'_>, sums: &mut [R]) {
     let ([width, height], first) = (bundle.window.size, bundle.window.first);
     let (cells, taps) = (bundle.cells.as_chunks::<N>().0, columns.cells as isize);
@@ -136,15 +137,15 @@ struct PixelColumns<'a> {
 /// Sums the columns of neighbouring pixels.
 fn add_pixels<R: Real>(columns: &[R], places: usize, pixels: &PixelColumns<'_>, sums: &mut [[R; TOGETHER]]) {
     match places {
-        1 => add_rows::<R, 1>(columns, pixels, sums),
-        2 => add_rows::<R, 2>(columns, pixels, sums),
-        4 => add_rows::<R, 4>(columns, pixels, sums),
-        8 => add_rows::<R, 8>(columns, pixels, sums),
-        _ => add_rows::<R, TOGETHER>(columns, pixels, sums),
+        1 => dispatch!(add_rows::<R, 1>(columns, pixels, sums)),
+        2 => dispatch!(add_rows::<R, 2>(columns, pixels, sums)),
+        4 => dispatch!(add_rows::<R, 4>(columns, pixels, sums)),
+        8 => dispatch!(add_rows::<R, 8>(columns, pixels, sums)),
+        _ => dispatch!(add_rows::<R, TOGETHER>(columns, pixels, sums)),
     }
 }
 
-#[cfg_attr(not(feature = "portable"), multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2")))]
+#[inline(always)]
 fn add_rows<R: Real, const N: usize>(columns: &[R], pixels: &PixelColumns<'_>, sums: &mut [[R; TOGETHER]]) {
     let PixelColumns { first, weights, cells } = *pixels;
     let columns = columns.as_chunks::<N>().0;

@@ -6,21 +6,21 @@ use std::borrow::Cow;
 
 /// A block, and the voxels whose samples are known.
 #[derive(Debug, Clone, Copy)]
-pub struct SampledBox {
+pub struct BlockWithGhosts {
     /// Voxels of the block along x, y, z.
     pub size: [usize; 3],
     /// Voxels with samples: the block's own, and possibly one more along each of x, y, z.
     pub known: [usize; 3],
 }
 
-impl From<[usize; 3]> for SampledBox {
+impl From<[usize; 3]> for BlockWithGhosts {
     /// A block without the samples around it.
     fn from(size: [usize; 3]) -> Self {
         Self { size, known: size }
     }
 }
 
-impl SampledBox {
+impl BlockWithGhosts {
     /// The samples of the block alone, frame by frame.
     pub(super) fn own<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Cow<'a, [u8]> {
         let (each, [x, y, z]) = (codec.sample.size(), self.size);
