@@ -69,6 +69,17 @@ pub trait Pooled: Copy + Default + 'static {
     fn spare() -> &'static Mutex<Vec<Vec<Self>>>;
 }
 
+/// Returns the memory of all unused buffers to the system.
+pub(crate) fn release_spare() {
+    fn release<T: Pooled>() {
+        *spare::<T>() = Vec::new();
+    }
+    release::<u8>();
+    release::<i32>();
+    release::<f32>();
+    release::<f64>();
+}
+
 macro_rules! pooled {
     ($($t:ty),*) => {
         $(impl Pooled for $t {

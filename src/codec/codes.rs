@@ -69,6 +69,14 @@ impl Codes {
         if let Self::Sparse(codes) = self { codes } else { &NO_CODES }
     }
 
+    /// Bytes of memory that the codes take.
+    pub(super) fn held_bytes(&self) -> usize {
+        match self {
+            Self::Dense(codes) => size_of_val(&codes[..]),
+            Self::Sparse(codes) => codes.held_bytes(),
+        }
+    }
+
     /// Whether no codes are held.
     pub(crate) fn is_empty(&self) -> bool {
         self.dense().is_empty() && self.sparse().count() == 0

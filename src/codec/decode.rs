@@ -211,6 +211,13 @@ impl Block {
         at_once.then(|| Field::refined(codec, self.of, self.step, self.codes.sparse(), wanted))
     }
 
+    /// Bytes of memory that the block takes.
+    pub(crate) fn held_bytes(&self) -> usize {
+        let overrides = self.missing.0.len() + self.missing.1.len() + self.outliers.samples.len();
+        let exact = self.exact.as_ref().map_or(0, Vec::len);
+        self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact
+    }
+
     /// Whether any sample is stored exactly, and overrides the coefficients.
     pub(crate) fn overrides(&self) -> bool {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())

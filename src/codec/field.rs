@@ -100,6 +100,17 @@ impl Field<'static> {
     }
 }
 
+impl Field<'_> {
+    /// Bytes of memory that the coefficients take.
+    pub(crate) fn held_bytes(&self) -> usize {
+        match &self.values {
+            Values::Zero | Values::Codes { .. } => 0,
+            Values::Single(values) => size_of_val(&values[..]),
+            Values::Double(values) => size_of_val(&values[..]),
+        }
+    }
+}
+
 impl<'a> Field<'a> {
     /// Decodes all codes of a block. Without codes, all coefficients are zero.
     pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a Codes) -> Self {

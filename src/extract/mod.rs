@@ -105,6 +105,7 @@ pub fn extract_to(
     progress: &dyn Progress,
 ) -> Result<ExtractReport> {
     progress.start(Some(config.frames.len() as u64));
+    file.begin_run();
     let mut report = ExtractReport::default();
     let pieces = Pieces::new(file, config)?;
     let all = config.frames.len() * config.region.voxels() * file.sample().size();
@@ -274,11 +275,11 @@ fn read_window(
     report: &mut ExtractReport,
 ) -> Result<()> {
     let InWindow { window, codec, frames, wanted } = InWindow::new(file, frames)?;
+    let is_part = frames.len() < codec.frames() || target.region != file.grid.whole();
     for entries in file.entries(window, channel, &target.region) {
         for entries in entries?.chunks(at_once) {
             file.fetch_blocks(&codec, entries, &wanted)?;
-            let decode =
-                |entry: &BlockEntry| file.block(&codec, entry, &wanted).map(|b| (b.samples(&codec), b.bytes_read));
+            let decode = |entry: &BlockEntry| file.samples(&codec, entry, &wanted, is_part);
             let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
                 let region = file.blocks.region(entry.id.block as usize);

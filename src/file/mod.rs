@@ -7,6 +7,7 @@ mod counted;
 mod detail;
 pub mod promise;
 mod fetch;
+mod decoded;
 mod coefficient_file;
 mod check;
 pub mod shard;
@@ -18,4 +19,5 @@ pub mod merge;
 pub mod resume;
 
 pub use coefficient_file::{CoefficientFile, setting, time_labels};
+pub(crate) use decoded::DecodedBlock;
 pub(crate) use fetch::Prefetch;

@@ -15,6 +15,9 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// One part in so many of a session's memory holds decoded blocks.
+const KEPT_SHARE: usize = 4;
+
 /// The inputs of pictures, and how they are opened.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
@@ -37,6 +40,8 @@ pub struct Session {
 #[derive(Debug)]
 struct Shared {
     inputs: Inputs,
+    /// Bytes of blocks that stay decoded.
+    room: usize,
     open: Mutex<Option<CoefficientFile>>,
     /// The same, with damaged blocks taken for missing samples.
     repaired: Mutex<Option<CoefficientFile>>,
@@ -45,14 +50,27 @@ struct Shared {
 impl Session {
     /// A session that opens these inputs when it needs them. Pictures take up to `memory` bytes.
     pub fn new(inputs: Inputs, memory: usize) -> Self {
-        let shared = Shared { inputs, open: Mutex::default(), repaired: Mutex::default() };
+        let shared = Shared { inputs, room: 0, open: Mutex::default(), repaired: Mutex::default() };
         Self { shared: shared.into(), memory }
     }
 
     /// A session of a file that is open, opened from `inputs`.
     pub fn from_file(file: CoefficientFile, inputs: Inputs, memory: usize) -> Self {
-        let shared = Shared { inputs, open: Mutex::new(Some(file)), repaired: Mutex::default() };
+        let shared = Shared { inputs, room: 0, open: Mutex::new(Some(file)), repaired: Mutex::default() };
         Self { shared: shared.into(), memory }
+    }
+
+    /// The same inputs, for many pictures: up to a quarter of the memory holds blocks that stay decoded from one to the next,
+    /// unless the open file keeps some already.
+    pub fn keeping_decoded(&self) -> Self {
+        let open = self.shared.open.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if open.as_ref().is_some_and(CoefficientFile::keeps_decoded) {
+            return self.clone();
+        }
+        let room = self.memory / KEPT_SHARE;
+        let open = Mutex::new(open.map(|file| file.keeping_decoded(room)));
+        let shared = Shared { inputs: self.shared.inputs.clone(), room, open, repaired: Mutex::default() };
+        Self { shared: shared.into(), memory: self.memory - room }
     }
 
     /// The same inputs for pictures that take up to `memory` bytes.
@@ -84,6 +102,7 @@ impl Session {
     /// Those of opening it.
     pub(super) fn file(&self, skips_damaged: bool) -> Result<CoefficientFile> {
         let file = kept(&self.shared.open, || self.open_file())?;
+        file.begin_run();
         if !skips_damaged {
             return Ok(file);
         }
@@ -96,7 +115,8 @@ impl Session {
             true => CoefficientFile::open_remote(path, &self.shared.inputs.remote),
             false => CoefficientFile::open_with(path, self.shared.inputs.frames.access),
         };
-        file.map_err(|e| hint_at_frames(path, e))
+        let file = file.map_err(|e| hint_at_frames(path, e))?;
+        Ok(if self.shared.room > 0 { file.keeping_decoded(self.shared.room) } else { file })
     }
 
     /// Opens the file again for the next picture.

@@ -85,6 +85,12 @@ impl SparseCodes {
     /// No codes.
     pub const NONE: Self = Self { places: Vec::new(), values: Vec::new(), ends: Vec::new() };
 
+    /// Bytes of memory that the codes take.
+    pub fn held_bytes(&self) -> usize {
+        let Self { places, values, ends } = self;
+        size_of_val(&places[..]) + size_of_val(&values[..]) + size_of_val(&ends[..])
+    }
+
     /// Removes all runs and keeps the memory.
     pub fn clear(&mut self) {
         self.places.clear();

@@ -6,12 +6,14 @@ use crate::codec::WindowCodec;
 use crate::codec::buffer::Buffer;
 use crate::codec::decode::Block;
 use crate::codec::field::Field;
+use crate::file::DecodedBlock;
 use crate::render::batches::{BlockPlanes, PlaneValues, Scratch};
+use std::sync::Arc;
 
 /// A decoded block of a file.
 pub(super) struct CodedBlock<'a> {
     plan: &'a BatchPlan,
-    block: Block,
+    decoded: Arc<DecodedBlock>,
     /// The error of its samples, for each error plane.
     errors: Vec<f64>,
     dense: Dense,
@@ -25,29 +27,32 @@ enum Dense {
     Samples(Buffer<u8>),
     /// Values of the plan's frames, computed from the coefficients: `frame * voxels + voxel`; empty if all are zero.
     Values(Vec<f64>),
-    /// Coefficients. The field holds all of them if they had to be decoded together.
-    Coefficients(Option<Field<'static>>),
+    /// Coefficients, which are those of the decoded block.
+    Coefficients,
 }
 
 impl<'a> CodedBlock<'a> {
     /// A block with the errors of its samples, one for each error plane.
-    pub(super) fn new(plan: &'a BatchPlan, block: Block, errors: Vec<f64>) -> Self {
-        let codec = &plan.codec;
+    pub(super) fn new(plan: &'a BatchPlan, decoded: Arc<DecodedBlock>, errors: Vec<f64>) -> Self {
+        let DecodedBlock { block, field } = decoded.as_ref();
         if block.exact.is_some() || plan.what == SplatSource::Samples {
-            let dense = Dense::Samples(block.samples(codec));
-            return Self { plan, block, errors, dense, few: Vec::new() };
+            let dense = Dense::Samples(block.samples(&plan.codec));
+            return Self { plan, decoded, errors, dense, few: Vec::new() };
         }
-        let field = block.field_at_once(codec, &plan.wanted);
-        let mut few = overrides(plan, &block, field.as_ref());
+        let mut few = overrides(plan, block, field.as_ref());
         let dense = match plan.by_values {
-            true => Dense::Values(values(plan, &block, field.as_ref(), &mut few)),
-            false => Dense::Coefficients(field),
+            true => Dense::Values(values(plan, block, field.as_ref(), &mut few)),
+            false => Dense::Coefficients,
         };
-        Self { plan, block, errors, dense, few }
+        Self { plan, decoded, errors, dense, few }
+    }
+
+    fn block(&self) -> &Block {
+        &self.decoded.block
     }
 
     fn plane_of_samples<'r>(&self, samples: &[u8], plane: usize, scratch: &'r mut Scratch) -> PlaneValues<'r> {
-        let Self { plan, block, .. } = self;
+        let (plan, block) = (self.plan, self.block());
         let Some((frame, absent)) = plan.layout.samples(plane) else { return PlaneValues::Nothing };
         let bytes = samples.len() / plan.codec.frames();
         scratch.bytes.clear();
@@ -67,20 +72,21 @@ impl<'a> CodedBlock<'a> {
             return PlaneValues::Nothing;
         }
         let coded = !matches!(self.dense, Dense::Samples(_));
-        let error = |voxel| if coded && misses_all(self.plan, &self.block, voxel) { 0.0 } else { error };
+        let error = |voxel| if coded && misses_all(self.plan, self.block(), voxel) { 0.0 } else { error };
         scratch.double.clear();
-        scratch.double.extend((0..self.block.voxels).map(error));
+        scratch.double.extend((0..self.block().voxels).map(error));
         PlaneValues::Double(&scratch.double)
     }
 }
 
 impl BlockPlanes for CodedBlock<'_> {
     fn voxels(&self) -> usize {
-        self.block.voxels
+        self.block().voxels
     }
 
     fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
-        let Self { plan, block, errors, dense, few } = self;
+        let Self { plan, decoded, errors, dense, few } = self;
+        let DecodedBlock { block, field } = decoded.as_ref();
         let voxels = block.voxels;
         if let Some(error) = plane.checked_sub(plan.layout.first_error()) {
             return Ok(self.plane_of_errors(errors[error], scratch));
@@ -90,17 +96,17 @@ impl BlockPlanes for CodedBlock<'_> {
         Ok(match dense {
             Dense::Samples(samples) => self.plane_of_samples(samples, plane, scratch),
             Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, PlaneValues::Double),
-            Dense::Coefficients(field) if plane < plan.layout.coefficients => {
+            Dense::Coefficients if plane < plan.layout.coefficients => {
                 coefficients(plan, block, field.as_ref(), plan.kept[plane], scratch)
             }
-            Dense::Coefficients(_) => few,
+            Dense::Coefficients => few,
         })
     }
 
     fn held(&self) -> [u64; 2] {
         let coded = !matches!(self.dense, Dense::Samples(_));
-        let nonzero = if coded { self.block.codes.nonzero() } else { 0 };
-        [nonzero as u64, self.block.bytes_read]
+        let nonzero = if coded { self.block().codes.nonzero() } else { 0 };
+        [nonzero as u64, self.block().bytes_read]
     }
 }
 

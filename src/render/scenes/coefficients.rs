@@ -11,9 +11,8 @@ use crate::base::error::Result;
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::progress::Progress;
 use crate::base::sample::{magnitude, rounding};
-use crate::codec::decode::Block;
 use crate::file::promise::share_tolerance;
-use crate::file::{CoefficientFile, Prefetch};
+use crate::file::{CoefficientFile, DecodedBlock, Prefetch};
 use crate::render::batches::{
     BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest,
     SampleErrors, Scene, Selection,
@@ -298,10 +297,12 @@ impl<'a> CoefficientBatch<'a> {
         Ok(())
     }
 
-    /// Reads a block, and returns it with the errors of its samples.
-    fn read(&self, block: usize) -> Result<(Block, Vec<f64>)> {
+    /// Decodes a block, and returns it with the errors of its samples.
+    fn read(&self, block: usize) -> Result<(Arc<DecodedBlock>, Vec<f64>)> {
         let KeptParts { entry, errors, .. } = self.kept(block)?;
-        Ok((self.file.block(&self.plan.codec, &entry, &self.plan.wanted)?, errors))
+        let BatchPlan { codec, wanted, what, .. } = &self.plan;
+        let splats_coefficients = *what == SplatSource::Coefficients;
+        Ok((self.file.decoded(codec, &entry, wanted, splats_coefficients)?, errors))
     }
 }
 

@@ -19,6 +19,9 @@ use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::picture::{Inputs, Session};
 use wavesplat::remote::{Cache, RemoteOptions};
 
+/// Bytes of blocks that stay decoded from one read or picture of a file to the next.
+const KEPT: usize = 256 << 20;
+
 /// Reads of fewer bytes end so soon that they need not be interruptible.
 const SHORT: usize = 16 << 20;
 
@@ -48,6 +51,7 @@ impl File {
                 true => CoefficientFile::open_remote(&inputs.paths[0], &inputs.remote)?,
                 false => CoefficientFile::open(&inputs.paths[0])?,
             };
+            let whole = whole.keeping_decoded(KEPT);
             let session = Session::from_file(whole.clone(), inputs, 0);
             Ok(Self { file: whole.with_detail(lod)?, session })
         };

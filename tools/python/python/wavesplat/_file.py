@@ -26,7 +26,8 @@ MEMORY = 512 << 20
 
 
 def open(path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None) -> File:
-    """Opens a coefficient file. Samples are read when they are asked for.
+    """Opens a coefficient file. Samples are read when they are asked for. Blocks that were decoded stay in memory for the
+    next reads and pictures, up to 256 MiB, until the file is gone.
 
     Args:
         path: A ``.wspl`` file, or the address of one: ``https://host/run.wspl`` or ``s3://bucket/run.wspl``, as a string.
