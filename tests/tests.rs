@@ -22,6 +22,7 @@ mod golden;
 mod images;
 mod inputs;
 mod lattice;
+mod kept;
 mod layering;
 mod library;
 mod left_out;

@@ -1,6 +1,7 @@
 //! Tips for arguments that are not understood.
 
 use super::config::{Config, chosen_command};
+use super::other_program;
 use crate::formats;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
@@ -66,82 +67,14 @@ fn is_frames(word: &str) -> bool {
 fn owner_tip(command: &Command, option: &str) -> Option<String> {
     let name = option.strip_prefix("--")?;
     let takes = |command: &&Command| command.get_arguments().any(|arg| arg.get_long() == Some(name));
-    let others: Vec<&str> = command.get_subcommands().filter(takes).map(Command::get_name).collect();
-    if !others.is_empty() {
-        return Some(format!("{option} is an option of {} {}", command.get_name(), others.join(", ")));
-    }
-    let elsewhere = OPTION_OWNERS.iter().find(|(_, options)| options.contains(&name));
-    let elsewhere = elsewhere.filter(|(owner, _)| owner.split(' ').next() != Some(command.get_name()));
-    elsewhere.map(|(owner, _)| format!("{option} is an option of {owner}"))
+    let owners = |program: &Command| {
+        let commands: Vec<&str> = program.get_subcommands().filter(takes).map(Command::get_name).collect();
+        let owner = if takes(&program) {
+            program.get_name().into()
+        } else {
+            format!("{} {}", program.get_name(), commands.join(", "))
+        };
+        (takes(&program) || !commands.is_empty()).then(|| format!("{option} is an option of {owner}"))
+    };
+    owners(command).or_else(|| owners(&other_program(command)))
 }
-
-/// Options that only one of the programs has. A program cannot look up the options of the other one.
-const OPTION_OWNERS: [(&str, &[&str]); 2] = [
-    (
-        "wavesplat-render",
-        &[
-            "annotate",
-            "background",
-            "bar-title",
-            "center",
-            "clear",
-            "colormap",
-            "depth",
-            "error",
-            "error-image",
-            "exaggerate",
-            "fast",
-            "fps",
-            "iso",
-            "key-frames",
-            "light",
-            "method",
-            "mode",
-            "norm",
-            "opacity",
-            "opacity-unit",
-            "orbit",
-            "over-time",
-            "partial",
-            "probe",
-            "probe-region",
-            "quantity",
-            "roll",
-            "scale",
-            "shade",
-            "sidecar",
-            "sigma",
-            "size",
-            "slice",
-            "slices",
-            "speed",
-            "splat-error",
-            "sum",
-            "tau",
-            "theme",
-            "title",
-            "view",
-        ],
-    ),
-    (
-        "wavesplat convert",
-        &[
-            "basis",
-            "block",
-            "bound",
-            "chain",
-            "clip",
-            "floor",
-            "level",
-            "max-error",
-            "missing",
-            "resume",
-            "samples",
-            "scan",
-            "seed",
-            "shard",
-            "space",
-            "window",
-        ],
-    ),
-];

@@ -4,6 +4,7 @@
 //! table is for the command or program of that name. The options are inserted before those of the command line, which override
 //! them.
 
+use super::other_program;
 use crate::base::error::{Error, Result};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
@@ -16,11 +17,6 @@ use toml::de::{DeTable, DeValue};
 
 /// The id of the option that names a file.
 const CONFIG: &str = "config";
-
-/// Names of tables that are for the other program or for one of its commands.
-const PROGRAMS: [&str; 2] = ["wavesplat", "wavesplat-render"];
-const COMMANDS: [&str; 10] =
-    ["convert", "append", "info", "verify", "extract", "recover", "scan", "merge", "view", "generate"];
 
 /// The subcommand that was given, or the program itself.
 pub(super) fn chosen_command<'a>(command: &'a Command, args: &[OsString]) -> &'a Command {
@@ -137,8 +133,9 @@ impl File<'_> {
 
     /// Whether a table is for the other program, which may read the same file.
     fn is_of_another(&self, table: &str) -> bool {
-        let is_program = PROGRAMS.contains(&table) && table != self.program.get_name();
-        is_program || !self.program.has_subcommands() && COMMANDS.contains(&table)
+        let other = other_program(self.program);
+        let is_command = !self.program.has_subcommands() && other.find_subcommand(table).is_some();
+        table == other.get_name() || is_command
     }
 
     /// An error if no command has an option of this name.

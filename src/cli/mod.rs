@@ -10,6 +10,8 @@ mod advice;
 #[cfg(feature = "cli")]
 mod choice;
 #[cfg(feature = "cli")]
+pub mod commands;
+#[cfg(feature = "cli")]
 mod common;
 #[cfg(feature = "cli")]
 mod config;
@@ -43,6 +45,8 @@ pub use common::CommonArgs;
 pub use generate::{GenerateArgs, Generated};
 pub use input::{InputArgs, SelectArgs, narrow, remembered};
 pub use messages::{advice, of_error as error_text, of_note as note_text};
+#[cfg(feature = "cli")]
+use program::other_program;
 #[cfg(feature = "cli")]
 pub use program::{command, main};
 #[cfg(feature = "cli")]

@@ -3,12 +3,12 @@
 use super::advice;
 use super::common::note;
 use super::config::Config;
-use super::{messages, optional};
+use super::{commands, messages, optional, render};
 use crate::base::error::{Error, Result};
 use crate::base::mapped;
 use crate::base::output::abandon;
 use clap::error::ErrorKind;
-use clap::{Command, Parser};
+use clap::{Command, CommandFactory, Parser};
 use std::env;
 use std::ffi::OsString;
 use std::io::{self, IsTerminal};
@@ -75,6 +75,14 @@ fn parse<A: Parser>(args: &[OsString], config: &Config) -> std::result::Result<A
     let all = config.add_to(&command, args);
     let parsed = command.try_get_matches_from_mut(all).and_then(|matches| A::from_arg_matches(&matches));
     parsed.map_err(|error| advice::with_tip(error, &command, args, config))
+}
+
+/// The other of the two programs, which may read the same file of options.
+pub(super) fn other_program(program: &Command) -> Command {
+    match program.get_name() {
+        "wavesplat" => render::Program::command(),
+        _ => commands::Cli::command(),
+    }
 }
 
 /// The arguments of a program. Its help begins with examples.

@@ -463,7 +463,8 @@ impl CoefficientFile {
             return Ok((samples, 0));
         }
         let (is_again, is_whole) = (kept.is_read_again(entry.id, self.lod), wanted.iter().all(|wanted| *wanted));
-        if !is_again && !(is_part && is_whole) {
+        let is_kept = is_again || is_part && is_whole;
+        if !is_kept {
             return decode(wanted);
         }
         let (samples, bytes_read) = decode(&vec![true; wanted.len()])?;

@@ -85,7 +85,7 @@ pub struct Histogram {
 impl ViewerSession {
     /// A viewer of some inputs; `base` has the settings of all pictures. The commands that it gives have `input_words` for
     /// how the inputs are opened.
-    pub fn new(session: Session, base: PictureRequest, input_words: Vec<String>) -> Self {
+    pub fn new(session: &Session, base: PictureRequest, input_words: Vec<String>) -> Self {
         Self { session: session.keeping_decoded(), base: PictureRequest { output: PAGE.into(), ..base }, input_words }
     }
 

@@ -143,5 +143,5 @@ pub fn viewer_session(
     words.extend(["-o".into(), "live.html".into(), "--".into()]);
     words.extend(inputs.iter().map(OsString::from));
     let render::Parsed { session, request, input_words } = render::parsed(words)?;
-    Ok(ViewerSession::new(session, request, input_words))
+    Ok(ViewerSession::new(&session, request, input_words))
 }

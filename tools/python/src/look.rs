@@ -55,7 +55,7 @@ pub(crate) struct Viewer {
 impl Viewer {
     pub(crate) fn new(py: Python<'_>, session: Session, request: &str, port: u16) -> PyResult<Self> {
         let request = PictureRequest::from_json(request).map_err(raised)?;
-        let session = ViewerSession::new(session, request, Vec::new());
+        let session = ViewerSession::new(&session, request, Vec::new());
         let localhost = IpAddr::V4(Ipv4Addr::LOCALHOST);
         let viewer = py.detach(|| view::Viewer::new(session, localhost, port, None)).map_err(raised)?;
         let address = viewer.address.clone();

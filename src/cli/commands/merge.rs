@@ -1,12 +1,12 @@
 //! `wavesplat merge`
 
+use crate::base::error::{Error, Result};
+use crate::base::output::STANDARD;
+use crate::cli::{CommonArgs, spare_inputs};
+use crate::file::merge::{MergeReport, Shards};
+use crate::file::resume::{self, IfUnfinished};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::STANDARD;
-use wavesplat::cli::{CommonArgs, spare_inputs};
-use wavesplat::file::merge::{MergeReport, Shards};
-use wavesplat::file::resume::{self, IfUnfinished};
 
 /// Join shards into one coefficient file
 #[derive(Debug, Args)]

@@ -1,15 +1,15 @@
 //! Describes an archive of frames.
 
 use super::InfoArgs;
+use crate::base::error::{Error, Result};
+use crate::base::output::STANDARD;
+use crate::cli::{note_text, print};
+use crate::convert::estimate::{Estimate, estimates};
+use crate::convert::{ConvertConfig, MissingPolicy};
+use crate::source::Archive;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::STANDARD;
-use wavesplat::cli::{note_text, print};
-use wavesplat::convert::estimate::{Estimate, estimates};
-use wavesplat::convert::{ConvertConfig, MissingPolicy};
-use wavesplat::source::Archive;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]

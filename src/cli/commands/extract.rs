@@ -1,18 +1,18 @@
 //! `wavesplat extract`
 
+use crate::base::error::{Error, Result};
+use crate::base::grid::Region;
+use crate::base::mapped::Access;
+use crate::base::output::STANDARD;
+use crate::cli::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
+use crate::extract::{
+    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to,
+};
+use crate::file::CoefficientFile;
+use crate::source::CHANNELS;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Region;
-use wavesplat::base::mapped::Access;
-use wavesplat::base::output::STANDARD;
-use wavesplat::cli::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
-use wavesplat::extract::{
-    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to,
-};
-use wavesplat::file::CoefficientFile;
-use wavesplat::source::CHANNELS;
 
 /// Decode a coefficient file back to samples
 #[derive(Debug, Args)]

@@ -1,18 +1,18 @@
 //! `wavesplat append`
 
 use super::convert::report;
+use crate::base::address::refuse_output;
+use crate::base::error::{Error, Result};
+use crate::base::output::{STANDARD, part_of};
+use crate::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
+use crate::convert::{ConvertConfig, append};
+use crate::file::CoefficientFile;
+use crate::file::merge::Shards;
+use crate::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
+use crate::file::shard::frames_of_shard;
+use crate::source::FrameSource;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::base::address::refuse_output;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::{STANDARD, part_of};
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
-use wavesplat::convert::{ConvertConfig, append};
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::merge::Shards;
-use wavesplat::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
-use wavesplat::file::shard::frames_of_shard;
-use wavesplat::source::FrameSource;
 
 /// Add later frames to a coefficient file
 #[derive(Debug, Args)]

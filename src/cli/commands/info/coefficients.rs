@@ -1,17 +1,17 @@
 //! Describes a coefficient file.
 
 use super::{description, made_by};
+use crate::base::description::Description;
+use crate::base::error::Result;
+use crate::cli::{CommonArgs, print};
+use crate::convert::{Bound, Packing};
+use crate::file::promise::range_of_shares;
+use crate::file::report::{BoundReport, WindowReport, largest_bound};
+use crate::file::{CoefficientFile, time_labels};
+use crate::source::CHANNELS;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use wavesplat::base::description::Description;
-use wavesplat::base::error::Result;
-use wavesplat::cli::{CommonArgs, print};
-use wavesplat::convert::{Bound, Packing};
-use wavesplat::file::promise::range_of_shares;
-use wavesplat::file::report::{BoundReport, WindowReport, largest_bound};
-use wavesplat::file::{CoefficientFile, time_labels};
-use wavesplat::source::CHANNELS;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]

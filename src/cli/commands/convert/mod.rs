@@ -4,21 +4,21 @@ mod given;
 mod options;
 
 use super::several;
+use crate::base::error::{Error, Note, Result};
+use crate::base::output::{Output, STANDARD};
+use crate::cli::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
+use crate::colour::TransferFunction;
+use crate::convert::{Bound, ConvertReport, Failure, run as convert};
+use crate::file::CoefficientFile;
+use crate::file::repack::{RepackReport, repack};
+use crate::file::resume::{self, IfUnfinished};
+use crate::formats::extensions;
+use crate::picture::colours_of_source;
+use crate::source::FrameSource;
 use clap::{Arg, Args, Command};
 pub(crate) use options::ConvertArgs;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Note, Result};
-use wavesplat::base::output::{Output, STANDARD};
-use wavesplat::cli::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
-use wavesplat::colour::TransferFunction;
-use wavesplat::convert::{Bound, ConvertReport, Failure, run as convert};
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::repack::{RepackReport, repack};
-use wavesplat::file::resume::{self, IfUnfinished};
-use wavesplat::formats::extensions;
-use wavesplat::picture::colours_of_source;
-use wavesplat::source::FrameSource;
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;

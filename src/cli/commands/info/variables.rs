@@ -1,9 +1,9 @@
 //! Lists the variables of an archive from which the user must choose one.
 
+use crate::base::error::Result;
+use crate::cli::{CommonArgs, print};
+use crate::source::VariableInfo;
 use serde::Serialize;
-use wavesplat::base::error::Result;
-use wavesplat::cli::{CommonArgs, print};
-use wavesplat::source::VariableInfo;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]

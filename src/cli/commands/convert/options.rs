@@ -1,14 +1,14 @@
 //! The options of `wavesplat convert`, and the request that they make.
 
 use super::given::GivenOptions;
+use crate::base::error::{Error, Result};
+use crate::cli::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
+use crate::convert::shard::Shard;
+use crate::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
+use crate::formats::extensions;
+use crate::picture::open_colours;
 use clap::{Arg, Args, ValueEnum};
 use std::path::PathBuf;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
-use wavesplat::convert::shard::Shard;
-use wavesplat::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
-use wavesplat::formats::extensions;
-use wavesplat::picture::open_colours;
 
 /// Convert frames to a coefficient file
 #[derive(Debug, Clone, Args)]

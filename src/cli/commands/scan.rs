@@ -1,12 +1,12 @@
 //! `wavesplat scan`
 
+use crate::base::error::{Error, Result};
+use crate::base::output::Output;
+use crate::cli::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
+use crate::convert::shard::{ArchiveScan, Shard};
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::Output;
-use wavesplat::cli::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
-use wavesplat::convert::shard::{ArchiveScan, Shard};
 
 /// Find the value range of all frames, which conversions of shards need
 #[derive(Debug, Args)]

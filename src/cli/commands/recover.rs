@@ -1,13 +1,13 @@
 //! `wavesplat recover`
 
+use crate::base::error::{Error, Result};
+use crate::base::mapped::{Access, FileBytes};
+use crate::base::output::{Output, STANDARD};
+use crate::cli::{CommonArgs, print, spare_inputs};
+use crate::file::recover::{RecoverReport, recover};
+use crate::file::resume;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::mapped::{Access, FileBytes};
-use wavesplat::base::output::{Output, STANDARD};
-use wavesplat::cli::{CommonArgs, print, spare_inputs};
-use wavesplat::file::recover::{RecoverReport, recover};
-use wavesplat::file::resume;
 
 /// Save the undamaged blocks of a damaged coefficient file
 #[derive(Debug, Args)]

@@ -6,11 +6,11 @@ mod description;
 mod made_by;
 mod variables;
 
+use crate::base::error::{Error, Result};
+use crate::cli::{CommonArgs, InputArgs, RemoteArgs, SelectArgs, share};
+use crate::file::CoefficientFile;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{CommonArgs, InputArgs, RemoteArgs, SelectArgs, share};
-use wavesplat::file::CoefficientFile;
 
 /// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
 #[derive(Debug, Args)]

@@ -1,15 +1,15 @@
 //! `wavesplat verify`
 
+use crate::base::error::{Error, Result};
+use crate::cli::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
+use crate::file::CoefficientFile;
+use crate::file::report::{BoundReport, largest_bound};
+use crate::file::shard::frames_of_shard;
+use crate::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
+use crate::source::FrameSource;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::cli::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::report::{BoundReport, largest_bound};
-use wavesplat::file::shard::frames_of_shard;
-use wavesplat::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
-use wavesplat::source::FrameSource;
 
 /// Check a coefficient file for damage, and its error bound against the source
 #[derive(Debug, Args)]

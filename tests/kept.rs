@@ -1,0 +1,117 @@
+//! Blocks that stay decoded between reads and pictures give the same samples and pixels, with any room and any threads.
+
+use crate::common::memory::Memory;
+use crate::common::random::Random;
+use crate::common::views::{archive, field};
+use crate::common::{Stored, pictures, stored};
+use std::thread;
+use wavesplat::base::grid::{Grid, Region};
+use wavesplat::base::sample::SampleType;
+use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
+use wavesplat::extract::read_region;
+use wavesplat::file::CoefficientFile;
+use wavesplat::render::{CoefficientScene, RenderConfig, SplatSource};
+use wavesplat::view::camera::View;
+
+const FRAMES: usize = 19;
+
+/// Room for nothing, for a few blocks, for about half of them, and for all.
+const ROOMS: [usize; 4] = [1, 20_000, 200_000, 64 << 20];
+
+fn files() -> Vec<Stored> {
+    let grid = Grid::unit([11, 9, 8]);
+    let samples = field(&grid, FRAMES, 3);
+    let source: Memory = archive(grid, SampleType::F32, &samples);
+    let file = |basis| {
+        let usual = ConvertConfig::new(1e-3);
+        let coding = SchemeConstraint { basis: Some(basis), ..usual.coding };
+        let config = ConvertConfig { coding, block: Some(4), window: 8, ..usual };
+        stored(&mut source.clone(), &config)
+    };
+    [Basis::Haar, Basis::Multi, Basis::Samples].map(file).into()
+}
+
+/// The samples of some frames of a box.
+fn read(file: &CoefficientFile, random: &mut Random) -> (Vec<f32>, std::ops::Range<usize>, Region) {
+    let first = random.below(FRAMES);
+    let frames = first..first + 1 + random.below((FRAMES - first).min(9));
+    let start = file.grid.dims.map(|n| random.below(n));
+    let end = [0, 1, 2].map(|a| start[a] + 1 + random.below(file.grid.dims[a] - start[a]));
+    let region = Region { start, end };
+    (read_region(file, frames.clone(), &region).expect("samples"), frames, region)
+}
+
+#[test]
+fn reads_of_a_file_that_keeps_blocks_are_those_of_one_that_does_not() {
+    for stored in files() {
+        for room in ROOMS {
+            let (kept, random) = (stored.open().keeping_decoded(room), &mut Random(room as u64));
+            for _ in 0..60 {
+                let (samples, frames, region) = read(&kept, random);
+                assert_eq!(samples, read_region(&stored.open(), frames, &region).expect("samples"), "{room}");
+            }
+        }
+    }
+}
+
+#[test]
+fn threads_share_the_blocks_that_are_kept() {
+    for stored in files() {
+        let kept = &stored.open().keeping_decoded(200_000);
+        thread::scope(|scope| {
+            for n in 0..4 {
+                let stored = &stored;
+                scope.spawn(move || {
+                    let random = &mut Random(n);
+                    for _ in 0..40 {
+                        let (samples, frames, region) = read(kept, random);
+                        assert_eq!(samples, read_region(&stored.open(), frames, &region).expect("samples"));
+                    }
+                });
+            }
+        });
+    }
+}
+
+#[test]
+fn a_loop_over_frames_reads_each_byte_of_the_file_about_once() {
+    for stored in files() {
+        let read_all = |file: &CoefficientFile| {
+            let before = file.bytes_read();
+            for frame in 0..FRAMES {
+                read_region(file, frame..frame + 1, &file.grid.whole()).expect("a frame");
+            }
+            file.bytes_read() - before
+        };
+        let (kept, plain) = (read_all(&stored.open().keeping_decoded(64 << 20)), read_all(&stored.open()));
+        assert!(kept < plain / 2, "{kept} of {plain}");
+    }
+}
+
+#[test]
+fn pictures_of_a_file_that_keeps_blocks_are_those_of_one_that_does_not() {
+    for stored in files() {
+        for room in ROOMS {
+            let kept = stored.open().keeping_decoded(room);
+            for (angle, lod, allowed, what) in [
+                (10.0, 0, None, SplatSource::Coefficients),
+                (80.0, 0, None, SplatSource::Coefficients),
+                (80.0, 1, None, SplatSource::Coefficients),
+                (10.0, 0, Some(0.02), SplatSource::Coefficients),
+                (10.0, 0, None, SplatSource::Samples),
+                (10.0, 0, None, SplatSource::Coefficients),
+            ] {
+                let drawn = |file: &CoefficientFile| {
+                    let mut scene = CoefficientScene::new(
+                        file.clone().with_detail(file.coarsest_detail().min(lod)).expect("a level"),
+                        what,
+                    );
+                    let view = View { size: [30, 20], ..View::new(angle, 20.0) };
+                    let config = RenderConfig { allowed, ..RenderConfig::new(&scene, view) };
+                    pictures(&mut scene, &config).0.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+                };
+                assert_eq!(drawn(&kept), drawn(&stored.open()), "{room} {angle} {lod} {allowed:?} {what:?}");
+            }
+        }
+    }
+}
