@@ -8,11 +8,10 @@ use crate::base::mapped::{Access, FileBytes, State};
 use crate::base::sample::SampleType;
 use crate::base::time_labels::TimeLabels;
 use crate::codec::WindowCodec;
-use crate::codec::buffer::Buffer;
 use crate::codec::coarse;
 use crate::codec::decode::Block;
 use crate::file::counted::Counted;
-use crate::file::decoded::{DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey};
+use crate::file::decoded::DecodedBlocks;
 use crate::file::detail;
 use crate::file::fetch::BLOCKS_TOGETHER;
 use crate::file::promise;
@@ -37,7 +36,7 @@ pub struct CoefficientFile {
     /// How it is cut into blocks.
     pub blocks: BlockGrid,
     /// The level of detail: the lattice has every 2^lod-th voxel along each axis.
-    lod: u32,
+    pub(super) lod: u32,
     /// The factor by which heights are multiplied.
     exaggeration: f64,
     /// What made samples into channels, if there are several.
@@ -45,7 +44,7 @@ pub struct CoefficientFile {
     /// Damaged blocks that are taken for missing samples, if they are.
     skipped: Option<Arc<Damage>>,
     /// Decoded blocks that are kept, if there is room for some.
-    kept: Option<Arc<DecodedBlocks>>,
+    pub(super) kept: Option<Arc<DecodedBlocks>>,
 }
 
 /// What is wrong with a file, block by block.
@@ -167,24 +166,6 @@ impl CoefficientFile {
     /// The level of detail of [`Self::with_detail`]; 0 for all voxels.
     pub fn lod(&self) -> u32 {
         self.lod
-    }
-
-    /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
-    pub fn keeping_decoded(mut self, bytes: usize) -> Self {
-        self.kept = Some(Arc::new(DecodedBlocks::new(bytes)));
-        self
-    }
-
-    /// Whether blocks stay decoded.
-    pub(crate) fn keeps_decoded(&self) -> bool {
-        self.kept.is_some()
-    }
-
-    /// Begins a picture or a read of samples, which uses blocks that earlier ones decoded.
-    pub(crate) fn begin_run(&self) {
-        if let Some(kept) = &self.kept {
-            kept.begin_run();
-        }
     }
 
     /// Its path, or the name of its storage.
@@ -417,63 +398,6 @@ impl CoefficientFile {
             return Ok(Block::missing(codec, size));
         }
         Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
-    }
-
-    /// As [`Self::block`], with the coefficients if they have to be decoded together. Uses and keeps what was decoded.
-    pub(crate) fn decoded(
-        &self,
-        codec: &WindowCodec,
-        entry: &BlockEntry,
-        wanted: &[bool],
-        is_field_needed: bool,
-    ) -> Result<Arc<DecodedBlock>> {
-        let decode = || {
-            let block = self.block(codec, entry, wanted)?;
-            let has_field = is_field_needed && block.exact.is_none();
-            let field = if has_field { block.field_at_once(codec, wanted) } else { None };
-            Ok(Arc::new(DecodedBlock { block, field }))
-        };
-        let Some(kept) = self.kept.as_ref().filter(|_| is_field_needed) else { return decode() };
-        let parts = entry.parts.iter().map(|part| part.kind).collect();
-        let key = self.key(entry, DecodedForm::Coefficients { wanted: wanted.to_vec(), parts });
-        if let Some(block) = kept.block(&key) {
-            return Ok(block);
-        }
-        let block = decode()?;
-        kept.keep_block(key, &block);
-        Ok(block)
-    }
-
-    /// The samples of a block in all frames of its window, and the stored bytes read; of frames that need more than the
-    /// coefficients in `wanted` they are arbitrary. Uses what was decoded. Keeps a block of which `is_part` is read, or that
-    /// is read again.
-    pub(crate) fn samples(
-        &self,
-        codec: &WindowCodec,
-        entry: &BlockEntry,
-        wanted: &[bool],
-        is_part: bool,
-    ) -> Result<(Arc<Buffer<u8>>, u64)> {
-        let decode = |wanted: &[bool]| {
-            self.block(codec, entry, wanted).map(|block| (Arc::new(block.samples(codec)), block.bytes_read))
-        };
-        let Some(kept) = &self.kept else { return decode(wanted) };
-        let key = self.key(entry, DecodedForm::Samples);
-        if let Some(samples) = kept.samples(&key) {
-            return Ok((samples, 0));
-        }
-        let (is_again, is_whole) = (kept.is_read_again(entry.id, self.lod), wanted.iter().all(|wanted| *wanted));
-        let is_kept = is_again || is_part && is_whole;
-        if !is_kept {
-            return decode(wanted);
-        }
-        let (samples, bytes_read) = decode(&vec![true; wanted.len()])?;
-        kept.keep_samples(key, &samples);
-        Ok((samples, bytes_read))
-    }
-
-    fn key(&self, entry: &BlockEntry, form: DecodedForm) -> DecodedKey {
-        DecodedKey { id: entry.id, lod: self.lod, form }
     }
 
     /// All voxels of a block, decoded or not.

@@ -9,6 +9,7 @@ pub mod promise;
 mod fetch;
 mod decoded;
 mod coefficient_file;
+mod keep;
 mod check;
 pub mod shard;
 pub mod report;
