@@ -84,12 +84,16 @@
 //! | `convert` | frames to a coefficient file: reader, workers and writer |
 //! | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
 //! | `extract` | a coefficient file back to samples and to files of other programs |
-//! | `picture` | requests for pictures: resolved, planned, rendered and written, for all front ends |
-//! | `cli` | what the programs in `bin/` share |
+//! | `picture` | a request for pictures, resolved and carried out, for the programs, the viewer and Python |
+//! | `cli` | the options and commands of the programs in `bin/`, and the server of the viewer |
 //!
 //! The bytes of a coefficient file are a package of their own, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
 //!
-//! # From a file to a pixel
+//! # From a request to a pixel
+//!
+//! A [`picture::PictureRequest`] says in plain data what is asked for. Options (`cli/render/args.rs`), the page of the viewer
+//! (`picture/view_request.rs`) and Python give one. [`picture::run`] resolves it against the open inputs of a
+//! [`picture::Session`]: `Plan::new` (`picture/plan/mod.rs`) finds frames, views, colours, ranges and files. Then:
 //!
 //! 1. `CoefficientFile::open` (`file/coefficient_file.rs`) reads the directory of blocks.
 //! 2. `render` (`render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each view,
@@ -122,8 +126,7 @@
 //! A test reads the sources and checks these rules.
 //!
 //! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `formats` and
-//!   `codec`; then `file`; then `convert`, `render` and `extract`; then `picture`;
-//!   then `cli`; then the programs.
+//!   `codec`; then `file`; then `convert`, `render` and `extract`; then `picture`; then `cli`; then the programs.
 //! - `convert`, `render` and `extract` do not use each other: they meet in the coefficient file. Nor do `formats` and `codec`.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
 //! - All `unsafe` code is in `base/mapped.rs`.

@@ -1,19 +1,21 @@
 //! Partial sums of pictures: what some voxels or frames add to them, and pictures of such sums.
 
-use super::annotations::{annotation, axes_of_region, note_scale, note_title};
-use super::colouring::{ColouredPictures, ColouringInput};
-use super::config::{frames_of, render_config};
-use super::modes::{check_slices, mode_name};
-use super::opened::Opened;
-use super::provenance::provenance;
-use super::ranges::{Needed, Ranges};
+use super::plan::annotations::{annotation, axes_of_region, note_scale, note_title};
+use super::plan::colouring::ColouredPictures;
+use super::plan::colouring::ColouringInput;
+use super::plan::config::{frames_of, render_config};
+use super::plan::modes::{check_slices, mode_name};
+use super::plan::opened::Opened;
+use super::plan::provenance::provenance;
+use super::plan::ranges::Needed;
+use super::plan::ranges::Ranges;
+use super::plan::sinks::SinkInput;
+use super::plan::targets::AllTargets;
 use super::report::{Reported, note_errors, summary, unit, written};
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::run::Outcome;
 use super::session::Session;
-use super::sinks::SinkInput;
-use super::targets::AllTargets;
 use super::values::ModeName;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;

@@ -1,7 +1,7 @@
 //! What a run reports: notes, the sidecar and `--json`.
 
-use super::colouring::ColouredPictures;
-use super::modes::mode_name;
+use super::plan::colouring::ColouredPictures;
+use super::plan::modes::mode_name;
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::values::ModeName;

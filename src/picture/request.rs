@@ -231,6 +231,11 @@ impl PictureRequest {
         !self.probe.is_empty() || !self.probe_region.is_empty()
     }
 
+    /// Whether anything is drawn around the volume.
+    pub(super) fn is_annotated(&self) -> bool {
+        self.annotate.is_some() || self.title.is_some() || self.bar_title.is_some()
+    }
+
     /// Whether data goes to standard output.
     pub(super) fn writes_to_stdout(&self) -> bool {
         self.output == Path::new(STANDARD)

@@ -1,6 +1,6 @@
 //! What pictures are made of, open for many of them.
 
-use super::opened::FRAMES_HINT;
+use super::plan::opened::FRAMES_HINT;
 use super::reporter::Reporter;
 use crate::base::address::{is_address, public_name};
 use crate::base::error::{Error, Result};

@@ -1,9 +1,10 @@
 //! Pictures for a page that asks for them: facts about a scene, a page with them, and pictures by request.
 
-use super::config::render_config;
-use super::opened::Opened;
 use super::plan::Plan;
-use super::ranges;
+use super::plan::config::render_config;
+use super::plan::opened::Opened;
+use super::plan::ranges::distribution;
+use super::plan::ranges::distribution_of_frames;
 use super::reporter::Caller;
 use super::request::PictureRequest;
 use super::series::series_csv;
@@ -168,8 +169,8 @@ impl ViewerSession {
         let memory = self.session.memory;
         let config = render_config(&request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, memory)?;
         let samples = match frame {
-            Some(frame) => ranges::distribution_of_frames(scene.as_mut(), &config, &[frame], &caller)?,
-            None => ranges::distribution(scene.as_mut(), &config, &caller)?,
+            Some(frame) => distribution_of_frames(scene.as_mut(), &config, &[frame], &caller)?,
+            None => distribution(scene.as_mut(), &config, &caller)?,
         };
         Ok(samples
             .as_ref()

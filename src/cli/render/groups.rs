@@ -5,7 +5,7 @@ use crate::base::values::{Pair, RegionSpec};
 use crate::cli::choice::choice;
 use crate::colour::{Norm, Opacities};
 use crate::picture::PictureRequest;
-use crate::picture::speed::{FASTEST, SLOWEST};
+use crate::picture::plan::speed::{FASTEST, SLOWEST};
 use crate::picture::values::{ClearSpec, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme};
 use crate::render::annotate::Parts;
 use clap::Args;

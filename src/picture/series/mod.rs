@@ -3,8 +3,8 @@
 mod chart;
 mod table;
 
-use super::axes::Axes;
-use super::config::frames_of;
+use super::plan::axes::Axes;
+use super::plan::config::frames_of;
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::run::Outcome;

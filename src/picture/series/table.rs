@@ -5,7 +5,7 @@ use super::chart::{Band, Chart, Line};
 use crate::base::error::Result;
 use crate::base::time_labels::TimeLabels;
 use crate::file::{CoefficientFile, setting, time_labels};
-use crate::picture::axes::text;
+use crate::picture::plan::axes::text;
 use std::fmt::Write as _;
 
 /// What the file calls its samples and times.

@@ -1,11 +1,11 @@
 //! The axes of all voxels: their names, units and coordinates, and positions along them in voxels.
 
 use super::units::in_letters;
-use super::values::AxisPosition;
 use crate::base::description::{Attribute, Description, Values, coordinates};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
 use crate::file::CoefficientFile;
+use crate::picture::values::AxisPosition;
 use crate::render::annotate::AxisLabels;
 
 /// An axis of voxels.

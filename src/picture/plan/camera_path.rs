@@ -1,23 +1,27 @@
 //! Where the camera stands at each frame.
 
-use super::request::PictureRequest;
 use crate::base::error::{Error, Result};
 use crate::base::text;
+use crate::picture::request::PictureRequest;
 use std::path::Path;
 
 /// Where the camera stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stand {
+pub(in crate::picture) struct Stand {
     /// In degrees.
-    pub(super) azimuth: f64,
-    pub(super) elevation: f64,
+    pub(in crate::picture) azimuth: f64,
+    pub(in crate::picture) elevation: f64,
     /// How much larger than usual the volume is drawn.
-    pub(super) zoom: f64,
+    pub(in crate::picture) zoom: f64,
 }
 
 /// The frame of each picture if views share the frames, in the order of the views: evenly, from the first frame to the
 /// last.
-pub(super) fn frames_of_views(request: &PictureRequest, frames: Vec<usize>, views: usize) -> Result<Vec<usize>> {
+pub(in crate::picture) fn frames_of_views(
+    request: &PictureRequest,
+    frames: Vec<usize>,
+    views: usize,
+) -> Result<Vec<usize>> {
     if !request.over_time {
         return Ok(frames);
     }
@@ -29,12 +33,12 @@ pub(super) fn frames_of_views(request: &PictureRequest, frames: Vec<usize>, view
 }
 
 /// Whether each picture has a view of its own.
-pub(super) fn is_moving(request: &PictureRequest) -> bool {
+pub(in crate::picture) fn is_moving(request: &PictureRequest) -> bool {
     request.over_time || request.key_frames.is_some()
 }
 
 /// Where the camera stands at each of some frames, by a file of key frames.
-pub(super) fn stands(path: &Path, frames: &[usize]) -> Result<Vec<Stand>> {
+pub(in crate::picture) fn stands(path: &Path, frames: &[usize]) -> Result<Vec<Stand>> {
     let keys = key_frames(&text::read(path, "list of key frames")?).map_err(|what| Error::input(path, what))?;
     let at: Vec<f64> = keys.iter().map(|key| key[0]).collect();
     let column = |n: usize| Curve::new(&at, keys.iter().map(|key| key[n]).collect());

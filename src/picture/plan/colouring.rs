@@ -1,27 +1,27 @@
 //! The colours of the pictures of a run.
 
-use super::colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
 use super::modes;
 use super::planes::{planes_of, with_planes};
 use super::ranges::{self, Needed, Ranges};
-use super::reporter::Reporter;
-use super::request::PictureRequest;
 use super::targets::Targets;
-use super::values::{ModeName, Theme};
+use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
 use crate::base::error::{Error, Result};
 use crate::colour::{Norm, Rgb, Scale, TransferFunction};
 use crate::file::CoefficientFile;
+use crate::picture::reporter::Reporter;
+use crate::picture::request::PictureRequest;
+use crate::picture::values::{ModeName, Theme};
 use crate::render::sink::PictureFormat;
 use crate::render::{Mode, Pixel, Quantity, RenderConfig, Scene};
 use serde::Serialize;
 
 /// The colours of pictures and of pictures of their errors.
-pub(super) struct Colouring {
+pub(in crate::picture) struct Colouring {
     /// The meaning of a pixel's numbers.
-    pub(super) pixel: Pixel,
-    pub(super) map: TransferFunction,
-    pub(super) of_pictures: Scale,
-    pub(super) of_errors: Scale,
+    pub(in crate::picture) pixel: Pixel,
+    pub(in crate::picture) map: TransferFunction,
+    pub(in crate::picture) of_pictures: Scale,
+    pub(in crate::picture) of_errors: Scale,
     /// Whether pictures are in colours.
     in_colours: bool,
     /// Whether pictures of errors are.
@@ -30,13 +30,13 @@ pub(super) struct Colouring {
 
 /// The values of the first and the last colour, for pictures that are in colours.
 #[derive(Serialize)]
-pub(super) struct ColouredPictures {
-    pub(super) range: Option<(f64, f64)>,
-    pub(super) error_range: Option<(f64, f64)>,
+pub(in crate::picture) struct ColouredPictures {
+    pub(in crate::picture) range: Option<(f64, f64)>,
+    pub(in crate::picture) error_range: Option<(f64, f64)>,
 }
 
 impl Colouring {
-    pub(super) fn coloured(&self) -> ColouredPictures {
+    pub(in crate::picture) fn coloured(&self) -> ColouredPictures {
         ColouredPictures {
             range: self.in_colours.then(|| self.of_pictures.range()),
             error_range: self.errors_in_colours.then(|| self.of_errors.range()),
@@ -45,20 +45,20 @@ impl Colouring {
 }
 
 /// What decides the colours of pictures.
-pub(super) struct ColouringInput<'a> {
-    pub(super) request: &'a PictureRequest,
+pub(in crate::picture) struct ColouringInput<'a> {
+    pub(in crate::picture) request: &'a PictureRequest,
     /// Numbers of a sample.
-    pub(super) channels: usize,
-    pub(super) config: &'a RenderConfig,
-    pub(super) pictures: &'a Targets,
-    pub(super) errors: Option<&'a Targets>,
+    pub(in crate::picture) channels: usize,
+    pub(in crate::picture) config: &'a RenderConfig,
+    pub(in crate::picture) pictures: &'a Targets,
+    pub(in crate::picture) errors: Option<&'a Targets>,
     /// The colours of samples.
-    pub(super) colours: Option<&'a TransferFunction>,
+    pub(in crate::picture) colours: Option<&'a TransferFunction>,
 }
 
 impl ColouringInput<'_> {
     /// The colours, over given ranges or those that `ranges` finds.
-    pub(super) fn colouring(
+    pub(in crate::picture) fn colouring(
         &self,
         ranges: impl FnOnce(Needed) -> Result<Ranges>,
         reporter: &dyn Reporter,
@@ -140,7 +140,7 @@ fn report_ranges((lo, hi): (f64, f64), ranges: &Ranges, found: Needed, reporter:
 
 /// The colours of a composite or of surfaces. A range that is not given ends at the largest value of small pictures.
 /// Opacities that are not given are suggested from an overview of the samples.
-pub(super) fn automatic_colours(
+pub(in crate::picture) fn automatic_colours(
     request: &PictureRequest,
     scene: &mut dyn Scene,
     config: &mut RenderConfig,
@@ -166,7 +166,11 @@ pub(super) fn automatic_colours(
 }
 
 /// Says which surfaces no sample of the file reaches.
-pub(super) fn note_surfaces(config: &RenderConfig, file: Option<&CoefficientFile>, reporter: &dyn Reporter) {
+pub(in crate::picture) fn note_surfaces(
+    config: &RenderConfig,
+    file: Option<&CoefficientFile>,
+    reporter: &dyn Reporter,
+) {
     let (Mode::Iso { surfaces, .. }, Some(file)) = (&config.mode, file) else { return };
     let (lo, hi) = file.source_range();
     for surface in surfaces.iter().filter(|surface| !(lo..=hi).contains(&surface.value)) {

@@ -2,14 +2,10 @@
 
 use super::annotations::annotation;
 use super::axes::Axes;
-use super::colours::colours_of_source;
 use super::config::frames_of;
 use super::modes;
-use super::reporter::Reporter;
-use super::request::PictureRequest;
-use super::session::Session;
+use super::named_colours::colours_of_source;
 use super::units::values_of;
-use super::values::{Detail, Exaggeration};
 use super::views::views;
 use crate::base::description::{coordinates, is_regular};
 use crate::base::error::{Error, Result};
@@ -17,6 +13,10 @@ use crate::base::grid::Grid;
 use crate::base::output::STANDARD;
 use crate::colour::TransferFunction;
 use crate::file::{CoefficientFile, time_labels};
+use crate::picture::reporter::Reporter;
+use crate::picture::request::PictureRequest;
+use crate::picture::session::Session;
+use crate::picture::values::{Detail, Exaggeration};
 use crate::render::annotate::Annotation;
 use crate::render::{CoefficientScene, FrameScene, Scene, SplatSource};
 use crate::view::camera::Camera;
@@ -24,23 +24,27 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The scene to render.
-pub(super) struct Opened {
-    pub(super) scene: Box<dyn Scene>,
+pub(in crate::picture) struct Opened {
+    pub(in crate::picture) scene: Box<dyn Scene>,
     /// The coefficient file of the scene.
-    pub(super) file: Option<Arc<CoefficientFile>>,
+    pub(in crate::picture) file: Option<Arc<CoefficientFile>>,
     /// The factor by which heights are drawn taller.
-    pub(super) exaggeration: f64,
+    pub(in crate::picture) exaggeration: f64,
     /// The times of frames.
-    pub(super) annotation: Annotation,
+    pub(in crate::picture) annotation: Annotation,
     /// The colours of samples, applied before splatting or along the ray.
-    pub(super) colours: Option<TransferFunction>,
+    pub(in crate::picture) colours: Option<TransferFunction>,
     /// The axes of all voxels.
-    pub(super) axes: Axes,
+    pub(in crate::picture) axes: Axes,
 }
 
 impl Opened {
     /// Opens the scene to render, and its file.
-    pub(super) fn new(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Self> {
+    pub(in crate::picture) fn new(
+        session: &Session,
+        request: &PictureRequest,
+        reporter: &dyn Reporter,
+    ) -> Result<Self> {
         match session.coefficient_path(request.method) {
             Some(path) => Self::from_coefficients(session, path, request, reporter),
             None => Self::from_frames(session, request, reporter),
@@ -156,4 +160,4 @@ fn refuse_for_frames(session: &Session, request: &PictureRequest) -> Result<()> 
     Ok(())
 }
 
-pub(super) const FRAMES_HINT: &str = "convert frames first, or render them with --method direct";
+pub(in crate::picture) const FRAMES_HINT: &str = "convert frames first, or render them with --method direct";

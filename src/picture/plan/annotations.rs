@@ -1,19 +1,14 @@
 //! What is drawn around the volume.
 
 use super::axes::Axes;
-use super::reporter::Reporter;
-use super::request::PictureRequest;
-use super::targets::is_page;
+use super::format::is_page;
 use crate::base::error::Result;
 use crate::base::grid::{Grid, Region};
 use crate::base::time_labels::TimeLabels;
+use crate::picture::reporter::Reporter;
+use crate::picture::request::PictureRequest;
 use crate::render::annotate::{Annotation, AxisLabels, Margins, Parts, VolumeAxes, margins};
 use crate::render::{Mode, RenderConfig};
-
-/// Whether anything is drawn around the volume.
-pub(super) fn is_annotated(request: &PictureRequest) -> bool {
-    request.annotate.is_some() || request.title.is_some() || request.bar_title.is_some()
-}
 
 /// The parts that are drawn into pictures. A web page itself has a title, a colour bar and the time.
 fn drawn_parts(request: &PictureRequest) -> Parts {
@@ -22,13 +17,13 @@ fn drawn_parts(request: &PictureRequest) -> Parts {
 }
 
 /// The margins of the pictures.
-pub(super) fn picture_margins(request: &PictureRequest) -> Margins {
+pub(in crate::picture) fn picture_margins(request: &PictureRequest) -> Margins {
     let has_title = request.title.is_some() && !is_page(request);
     margins(request.size.0, drawn_parts(request), has_title)
 }
 
 /// The annotations of pictures of these values and times, but for the axes.
-pub(super) fn annotation(request: &PictureRequest, values: String, times: TimeLabels) -> Annotation {
+pub(in crate::picture) fn annotation(request: &PictureRequest, values: String, times: TimeLabels) -> Annotation {
     Annotation {
         parts: drawn_parts(request),
         title: request.title.clone().unwrap_or_default(),
@@ -39,7 +34,7 @@ pub(super) fn annotation(request: &PictureRequest, values: String, times: TimeLa
 }
 
 /// Says how much of a long title pictures show.
-pub(super) fn note_title(
+pub(in crate::picture) fn note_title(
     request: &PictureRequest,
     annotation: &Annotation,
     config: &RenderConfig,
@@ -52,7 +47,7 @@ pub(super) fn note_title(
 }
 
 /// The axes of the volume as it is drawn, with their true coordinates.
-pub(super) fn volume_axes(
+pub(in crate::picture) fn volume_axes(
     request: &PictureRequest,
     axes: &Axes,
     whole: &Grid,
@@ -63,7 +58,7 @@ pub(super) fn volume_axes(
 }
 
 /// The axes of the voxels that are drawn.
-pub(super) fn axes_of_region(
+pub(in crate::picture) fn axes_of_region(
     labels: [AxisLabels; 3],
     whole: &Grid,
     region: Region,
@@ -75,7 +70,7 @@ pub(super) fn axes_of_region(
 }
 
 /// Says if a scale that is asked for cannot be drawn.
-pub(super) fn note_scale(annotation: &Annotation, reporter: &dyn Reporter) {
+pub(in crate::picture) fn note_scale(annotation: &Annotation, reporter: &dyn Reporter) {
     let lacks_unit = annotation.axes.as_ref().is_some_and(|volume| volume.length_unit().is_none());
     if annotation.parts.scale && lacks_unit {
         reporter.note(format_args!("no scale is drawn, since lengths differ from axis to axis"));

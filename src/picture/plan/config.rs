@@ -2,7 +2,6 @@
 
 use super::camera_path::{frames_of_views, is_moving};
 use super::modes;
-use super::request::PictureRequest;
 use super::views::{fixed, views};
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
@@ -10,12 +9,13 @@ use crate::colour::TransferFunction;
 use crate::convert::range_bound;
 use crate::file::CoefficientFile;
 use crate::file::promise::{range_of_shares, share_tolerance};
+use crate::picture::request::PictureRequest;
 use crate::render::{Limit, Mode, RenderConfig, Scene, SplatSource, default_splat_error};
 use crate::view::footprint::Kernel;
 use wavesplat_format::Metadata;
 
 /// The settings of pictures of some of `all` frames, which may be more than the scene has. `memory` is in bytes.
-pub(super) fn render_config(
+pub(in crate::picture) fn render_config(
     request: &PictureRequest,
     scene: &dyn Scene,
     file: Option<&CoefficientFile>,
@@ -48,7 +48,7 @@ pub(super) fn render_config(
 }
 
 /// The frames to render, of `all`.
-pub(super) fn frames_of(request: &PictureRequest, all: usize) -> Result<Vec<usize>> {
+pub(in crate::picture) fn frames_of(request: &PictureRequest, all: usize) -> Result<Vec<usize>> {
     request.frames.as_ref().map_or(Ok((0..all).collect()), |frames| frames.resolve(all))
 }
 

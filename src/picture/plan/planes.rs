@@ -1,17 +1,17 @@
 //! Slices: planes through the volume.
 
 use super::axes::Axes;
-use super::request::PictureRequest;
-use super::values::SliceSpec;
 use super::views::face_on;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
+use crate::picture::request::PictureRequest;
+use crate::picture::values::SliceSpec;
 use crate::render::{Mode, Plane, RenderConfig};
 
 const OPTION: &str = "--slice";
 
 /// The planes of a mode.
-pub(super) fn planes_of(mode: &Mode) -> Vec<Plane> {
+pub(in crate::picture) fn planes_of(mode: &Mode) -> Vec<Plane> {
     match mode {
         Mode::Composite { planes, .. } | Mode::Planes { planes } => planes.clone(),
         Mode::Projection | Mode::Iso { .. } | Mode::Mip { .. } => Vec::new(),
@@ -19,7 +19,7 @@ pub(super) fn planes_of(mode: &Mode) -> Vec<Plane> {
 }
 
 /// A mode with other planes, if it takes some.
-pub(super) fn with_planes(mode: Mode, planes: Vec<Plane>) -> Mode {
+pub(in crate::picture) fn with_planes(mode: Mode, planes: Vec<Plane>) -> Mode {
     match mode {
         Mode::Composite { transfer, unit, slices, light, .. } => {
             Mode::Composite { transfer, unit, slices, light, planes }
@@ -39,7 +39,7 @@ fn positions(request: &PictureRequest, axes: &Axes) -> Result<Vec<(usize, f64)>>
 }
 
 /// Sets the planes of a mode of slices, and the view of a single one. `lod` is the level of detail of `grid`.
-pub(super) fn set_planes(
+pub(in crate::picture) fn set_planes(
     config: &mut RenderConfig,
     request: &PictureRequest,
     axes: &Axes,
@@ -68,7 +68,7 @@ pub(super) fn set_planes(
 }
 
 /// The true positions of all slices, as the option takes them.
-pub(super) fn slice_texts(request: &PictureRequest, axes: &Axes) -> Result<Option<String>> {
+pub(in crate::picture) fn slice_texts(request: &PictureRequest, axes: &Axes) -> Result<Option<String>> {
     let texts: Vec<String> = positions(request, axes)?.into_iter().map(|(axis, at)| axes.text(axis, at)).collect();
     Ok(Some(texts.join(",")).filter(|texts| !texts.is_empty()))
 }

@@ -1,26 +1,26 @@
 //! The sinks that write pictures.
 
-use super::annotations::is_annotated;
 use super::colouring::Colouring;
+use super::format::is_page;
 use super::provenance::error_provenance;
-use super::request::PictureRequest;
 use super::speed::frames_per_second;
-use super::targets::{AllTargets, Targets, is_page};
+use super::targets::{AllTargets, Targets};
 use crate::base::error::Result;
+use crate::picture::request::PictureRequest;
 use crate::render::annotate::Annotation;
 use crate::render::sink::{Provenance, Sink, SinkConfig};
 use crate::render::{Pixel, RenderConfig, Rendered};
 use std::sync::Arc;
 
 /// The sinks of pictures and of their errors: one for each view, or one for all.
-pub(super) struct Sinks {
+pub(in crate::picture) struct Sinks {
     pictures: Vec<Sink>,
     errors: Vec<Sink>,
 }
 
 impl Sinks {
     /// Writes one rendered picture, and its error.
-    pub(super) fn picture(&mut self, rendered: &Rendered<'_>) -> Result<()> {
+    pub(in crate::picture) fn picture(&mut self, rendered: &Rendered<'_>) -> Result<()> {
         for sinks in [&mut self.errors, &mut self.pictures] {
             let index = if sinks.len() == 1 { 0 } else { rendered.view };
             sinks.get_mut(index).map_or(Ok(()), |sink| sink.picture(rendered))?;
@@ -29,24 +29,24 @@ impl Sinks {
     }
 
     /// Completes all files under their final names.
-    pub(super) fn finish(self) -> Result<()> {
+    pub(in crate::picture) fn finish(self) -> Result<()> {
         self.errors.into_iter().chain(self.pictures).try_for_each(Sink::finish)
     }
 }
 
 /// What the sinks of a run need.
-pub(super) struct SinkInput<'a> {
-    pub(super) request: &'a PictureRequest,
-    pub(super) config: &'a RenderConfig,
-    pub(super) targets: &'a AllTargets,
-    pub(super) colouring: &'a Colouring,
-    pub(super) provenance: &'a Provenance,
-    pub(super) annotation: &'a Annotation,
+pub(in crate::picture) struct SinkInput<'a> {
+    pub(in crate::picture) request: &'a PictureRequest,
+    pub(in crate::picture) config: &'a RenderConfig,
+    pub(in crate::picture) targets: &'a AllTargets,
+    pub(in crate::picture) colouring: &'a Colouring,
+    pub(in crate::picture) provenance: &'a Provenance,
+    pub(in crate::picture) annotation: &'a Annotation,
 }
 
 impl SinkInput<'_> {
     /// The settings of the sinks of pictures, still without the pictures that they show.
-    pub(super) fn config(&self) -> Result<SinkConfig> {
+    pub(in crate::picture) fn config(&self) -> Result<SinkConfig> {
         let Self { request, config, annotation, .. } = *self;
         Ok(SinkConfig {
             format: self.targets.pictures.format,
@@ -58,13 +58,13 @@ impl SinkInput<'_> {
             colours: self.colouring.of_pictures.clone(),
             depth: request.depth,
             coloured_array: request.colormap.is_some(),
-            annotation: (is_annotated(request) || is_page(request)).then(|| annotation.clone()),
+            annotation: (request.is_annotated() || is_page(request)).then(|| annotation.clone()),
             force: request.force,
         })
     }
 
     /// Opens the sinks of a run.
-    pub(super) fn open(&self) -> Result<Sinks> {
+    pub(in crate::picture) fn open(&self) -> Result<Sinks> {
         let of_pictures = self.config()?;
         let errors = match &self.targets.errors {
             Some(errors) => open(errors, &self.error_config(errors, &of_pictures), self.config)?,

@@ -1,24 +1,43 @@
 //! A request resolved against what it draws: from names to numbers, places, colours and files.
 
-use super::annotations::{note_scale, note_title, volume_axes};
-use super::colouring::{Colouring, ColouringInput, automatic_colours, note_surfaces};
-use super::config::render_config;
-use super::modes::check_slices;
-use super::opened::Opened;
-use super::planes::{set_planes, slice_texts};
-use super::provenance::provenance;
-use super::ranges::Ranges;
+pub(super) mod units;
+pub(super) mod axes;
+pub(super) mod named_colours;
+pub(super) mod modes;
+mod format;
+pub(super) mod targets;
+pub(super) mod annotations;
+mod camera_path;
+mod views;
+mod planes;
+pub(super) mod config;
+pub(super) mod ranges;
+mod value_colours;
+pub(super) mod colouring;
+pub(super) mod opened;
+pub(super) mod provenance;
+pub(crate) mod speed;
+pub(super) mod sinks;
+
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::session::Session;
-use super::sinks::SinkInput;
-use super::targets::AllTargets;
 use crate::base::error::Result;
 use crate::file::CoefficientFile;
 use crate::render::annotate::Annotation;
 use crate::render::sink::Provenance;
 use crate::render::{RenderConfig, Scene};
+use annotations::{note_scale, note_title, volume_axes};
+use colouring::{Colouring, ColouringInput, automatic_colours, note_surfaces};
+use config::render_config;
+use modes::check_slices;
+use opened::Opened;
+use planes::{set_planes, slice_texts};
+use provenance::provenance;
+use ranges::Ranges;
+use sinks::SinkInput;
 use std::sync::Arc;
+use targets::AllTargets;
 
 /// Everything that rendering needs, opened and chosen.
 pub(super) struct Plan {

@@ -1,18 +1,19 @@
 //! How the samples along a ray make a pixel, and what may be asked of each mode.
 
-use super::request::PictureRequest;
-use super::values::ModeName;
+use super::named_colours::open_colours;
+use super::named_colours::stretched;
 use crate::base::choice::Choice;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
 use crate::base::values::Numbers;
 use crate::colour::{Opacities, TransferFunction};
 use crate::file::CoefficientFile;
-use crate::picture::colours::{open_colours, stretched};
+use crate::picture::request::PictureRequest;
+use crate::picture::values::ModeName;
 use crate::render::{Light, Mode};
 
 /// The mode: as given, or the one that other fields imply.
-pub(super) fn mode_name(request: &PictureRequest) -> ModeName {
+pub(in crate::picture) fn mode_name(request: &PictureRequest) -> ModeName {
     match (request.mode, &request.iso) {
         (None, _) if !request.slice.is_empty() => ModeName::Slice,
         (None, Some(_)) => ModeName::Iso,
@@ -21,7 +22,7 @@ pub(super) fn mode_name(request: &PictureRequest) -> ModeName {
 }
 
 /// An error if a field does not apply to the mode. `is_direct` is whether frames are splatted.
-pub(super) fn check(request: &PictureRequest, is_direct: bool) -> Result<()> {
+pub(in crate::picture) fn check(request: &PictureRequest, is_direct: bool) -> Result<()> {
     let mode = mode_name(request);
     let needs = |given: bool, option: &str, takes: fn(ModeName) -> bool| {
         (given && !takes(mode)).then(|| format!("{option}: needs --mode {}", names(takes)))
@@ -46,7 +47,7 @@ pub(super) fn check(request: &PictureRequest, is_direct: bool) -> Result<()> {
 }
 
 /// An error if slices are missing, or the mode takes none.
-pub(super) fn check_slices(request: &PictureRequest) -> Result<()> {
+pub(in crate::picture) fn check_slices(request: &PictureRequest) -> Result<()> {
     match (request.slice.is_empty(), request.mode) {
         (true, Some(ModeName::Slice)) => Err(Error::usage("--mode slice: needs --slice, like --slice z=0.5")),
         (true, _) | (false, None | Some(ModeName::Slice | ModeName::Composite)) => Ok(()),
@@ -78,13 +79,13 @@ fn refuse_colours(mode: ModeName, is_direct: bool) -> Option<String> {
 }
 
 /// The name of the colours of a composite, or of coloured frames.
-pub(super) fn sample_colours(request: &PictureRequest) -> Option<&str> {
+pub(in crate::picture) fn sample_colours(request: &PictureRequest) -> Option<&str> {
     let usual = mode_name(request).colours_samples().then_some("viridis");
     request.transfer_function.as_deref().or(usual)
 }
 
 /// Whether the range of a composite's colours is automatic: neither given nor stored with the colours.
-pub(super) fn has_automatic_range(request: &PictureRequest) -> Result<bool> {
+pub(in crate::picture) fn has_automatic_range(request: &PictureRequest) -> Result<bool> {
     let colours_samples = mode_name(request).colours_samples();
     let Some(name) = sample_colours(request).filter(|_| colours_samples && request.range.is_none()) else {
         return Ok(false);
@@ -93,7 +94,7 @@ pub(super) fn has_automatic_range(request: &PictureRequest) -> Result<bool> {
 }
 
 /// Whether the opacities of a composite are to be suggested: neither given nor stored with the colours.
-pub(super) fn suggests_opacities(request: &PictureRequest, colours: &TransferFunction) -> bool {
+pub(in crate::picture) fn suggests_opacities(request: &PictureRequest, colours: &TransferFunction) -> bool {
     let suggests = match &request.opacity {
         Some(Opacities::Auto) => true,
         Some(Opacities::Points(_)) => false,
@@ -103,12 +104,15 @@ pub(super) fn suggests_opacities(request: &PictureRequest, colours: &TransferFun
 }
 
 /// The length over which opacities apply.
-pub(super) fn opacity_unit(request: &PictureRequest, grid: &Grid) -> f64 {
+pub(in crate::picture) fn opacity_unit(request: &PictureRequest, grid: &Grid) -> f64 {
     request.opacity_unit.unwrap_or_else(|| grid.largest_spacing())
 }
 
 /// The colours of a composite of a file, over the given range, their own range, or that of all samples.
-pub(super) fn colours_of_file(request: &PictureRequest, file: &CoefficientFile) -> Result<Option<TransferFunction>> {
+pub(in crate::picture) fn colours_of_file(
+    request: &PictureRequest,
+    file: &CoefficientFile,
+) -> Result<Option<TransferFunction>> {
     let colours_samples = mode_name(request).colours_samples();
     let Some(name) = sample_colours(request).filter(|_| colours_samples) else { return Ok(None) };
     let colours = open_colours("--transfer-function", name)?;
@@ -116,7 +120,7 @@ pub(super) fn colours_of_file(request: &PictureRequest, file: &CoefficientFile) 
 }
 
 /// The mode with these colours, which a composite needs.
-pub(super) fn mode(request: &PictureRequest, colours: Option<&TransferFunction>) -> Result<Mode> {
+pub(in crate::picture) fn mode(request: &PictureRequest, colours: Option<&TransferFunction>) -> Result<Mode> {
     let slices = request.slices;
     Ok(match mode_name(request) {
         ModeName::Projection => Mode::Projection,

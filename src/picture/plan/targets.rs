@@ -1,25 +1,23 @@
 //! The files that pictures are written to.
 
-use super::annotations::is_annotated;
-use super::colours::check_format;
-use super::request::PictureRequest;
-use crate::base::choice::Choice;
+use super::format::format_of;
 use crate::base::error::{Error, Result};
 use crate::base::inputs::spare_inputs;
 use crate::base::output::{Output, STANDARD, names_of_views};
+use crate::picture::request::PictureRequest;
 use crate::render::sink::{Depth, PictureFormat, Sink, is_ours};
 use crate::render::{RenderConfig, Scene, least_memory};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// The files of pictures: one for each view, or one for all.
-pub(super) struct Targets {
-    pub(super) format: PictureFormat,
-    pub(super) names: Vec<PathBuf>,
+pub(in crate::picture) struct Targets {
+    pub(in crate::picture) format: PictureFormat,
+    pub(in crate::picture) names: Vec<PathBuf>,
 }
 
 impl Targets {
-    pub(super) fn new(path: &Path, format: Option<PictureFormat>, config: &RenderConfig) -> Result<Self> {
+    pub(in crate::picture) fn new(path: &Path, format: Option<PictureFormat>, config: &RenderConfig) -> Result<Self> {
         let format = format.map_or_else(|| format_of(path), Ok)?;
         format.check(path)?;
         let joined = match format.takes_all(path) {
@@ -30,33 +28,33 @@ impl Targets {
     }
 
     /// The view and the frame of each picture in the file of this number.
-    pub(super) fn shown(&self, name: usize, config: &RenderConfig) -> Vec<(usize, usize)> {
+    pub(in crate::picture) fn shown(&self, name: usize, config: &RenderConfig) -> Vec<(usize, usize)> {
         let mut shown = config.shown();
         shown.retain(|(view, _)| self.names.len() == 1 || *view == name);
         shown
     }
 
     /// Bytes of memory that writing takes.
-    pub(super) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
+    pub(in crate::picture) fn memory(&self, depth: Depth, config: &RenderConfig) -> Result<usize> {
         let each = config.shown().len() / self.names.len();
         Ok(self.format.memory(depth, config.views[0].size, each)? * self.names.len())
     }
 }
 
 /// The files of pictures, and of their errors.
-pub(super) struct AllTargets {
-    pub(super) pictures: Targets,
-    pub(super) errors: Option<Targets>,
+pub(in crate::picture) struct AllTargets {
+    pub(in crate::picture) pictures: Targets,
+    pub(in crate::picture) errors: Option<Targets>,
 }
 
 impl AllTargets {
     /// The files for pictures and for their errors. No file may be written twice, and no input may be overwritten.
-    pub(super) fn new(request: &PictureRequest, inputs: &[PathBuf], config: &RenderConfig) -> Result<Self> {
+    pub(in crate::picture) fn new(request: &PictureRequest, inputs: &[PathBuf], config: &RenderConfig) -> Result<Self> {
         if request.format.is_none() {
             refuse_video(inputs, &request.output)?;
         }
         let pictures = Targets::new(&request.output, request.format, config)?;
-        check_format(request, pictures.format, is_annotated(request))?;
+        check_format(request, pictures.format, request.is_annotated())?;
         let errors = request.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;
         if request.error_image.as_deref() == Some(Path::new(STANDARD)) {
             return Err(Error::usage("--error-image: needs a file, not standard output"));
@@ -100,7 +98,12 @@ impl AllTargets {
     }
 
     /// Bytes of memory that are left for rendering. An error if they are too few.
-    pub(super) fn memory_besides(&self, scene: &dyn Scene, depth: Depth, config: &RenderConfig) -> Result<usize> {
+    pub(in crate::picture) fn memory_besides(
+        &self,
+        scene: &dyn Scene,
+        depth: Depth,
+        config: &RenderConfig,
+    ) -> Result<usize> {
         let errors = self.errors.as_ref().map_or(Ok(0), |errors| errors.memory(depth, config))?;
         let taken = self.pictures.memory(depth, config)? + errors;
         let needed = least_memory(scene, config)? + taken;
@@ -121,27 +124,6 @@ fn check_sidecar(path: &Path, inputs: &[PathBuf], force: bool) -> Result<()> {
     Output::check(path, force || is_ours(path))
 }
 
-/// Whether pictures go to a web page.
-pub(super) fn is_page(request: &PictureRequest) -> bool {
-    request.format.or_else(|| format_of(&request.output).ok()) == Some(PictureFormat::Page)
-}
-
-fn format_of(path: &Path) -> Result<PictureFormat> {
-    if path == Path::new(STANDARD) {
-        return Ok(PictureFormat::Png);
-    }
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let format = PictureFormat::named(extension).ok().filter(|format| *format != PictureFormat::Sheet);
-    format.ok_or_else(|| {
-        let what = match extension {
-            "" => "has no extension".into(),
-            other => format!("no pictures are written as .{other}"),
-        };
-        let formats = "take .png for a picture, .apng or .mp4 for a moving one, .html for a page, or webm gif npy y4m rgb24 gray16 exr";
-        Error::usage(format!("{}: {what}; {formats}", path.display()))
-    })
-}
-
 /// Extensions of other videos. ffmpeg makes them from a stream of pictures.
 const VIDEOS: [&str; 3] = ["mov", "avi", "mkv"];
 
@@ -155,4 +137,23 @@ fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
     let inputs: Vec<_> = inputs.iter().map(|input| input.to_string_lossy()).collect();
     let pipe = format!("wavesplat-render {} -o - --format y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
     Err(Error::usage(format!("{name}: write .mp4, .webm or .gif, or type: {pipe}")))
+}
+
+/// An error if a format cannot hold colours or annotations.
+pub(in crate::picture) fn check_format(
+    request: &PictureRequest,
+    format: PictureFormat,
+    is_annotated: bool,
+) -> Result<()> {
+    let in_colours = request.colormap.is_some();
+    if format == PictureFormat::Exr && in_colours {
+        return Err(Error::usage("--colormap: an .exr holds numbers, not colours; take png with --depth 16"));
+    }
+    let why = match format {
+        PictureFormat::Gray16 => "gray16 has no colours to draw in; take png, or another format",
+        PictureFormat::Exr => "an .exr holds numbers to compute with; take png, or another format",
+        PictureFormat::Npy if !in_colours => "an .npy holds values to compute with; give --colormap for colours",
+        _ => return Ok(()),
+    };
+    if is_annotated { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
 }

@@ -5,7 +5,7 @@ use crate::base::error::Result;
 use crate::file::{CoefficientFile, setting};
 
 /// The name and the unit of a file's values.
-pub(super) fn values_of(file: &CoefficientFile) -> Result<String> {
+pub(in crate::picture) fn values_of(file: &CoefficientFile) -> Result<String> {
     let (m, description) = (file.metadata(), file.description()?);
     let text = |name: &str| description.as_ref().and_then(|all| axes::text(&all.attributes, name));
     let name = text("long_name").or_else(|| text("standard_name").map(|name| name.replace('_', " ")));
@@ -16,7 +16,7 @@ pub(super) fn values_of(file: &CoefficientFile) -> Result<String> {
 }
 
 /// A unit as people write it: °C, and m s⁻¹ for "m s-1".
-pub(super) fn in_letters(unit: &str) -> String {
+pub(in crate::picture) fn in_letters(unit: &str) -> String {
     match unit.trim() {
         "degC" | "deg_C" | "degree_C" | "degrees_C" | "celsius" | "Celsius" => "°C".into(),
         "degrees_north" | "degree_north" => "°N".into(),

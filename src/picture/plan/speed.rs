@@ -1,8 +1,8 @@
 //! The frames per second of movies.
 
-use super::request::PictureRequest;
 use crate::base::error::{Error, Result};
 use crate::base::time_labels::TimeLabels;
+use crate::picture::request::PictureRequest;
 use crate::render::RenderConfig;
 
 /// The least and the largest number of frames per second.
@@ -10,7 +10,11 @@ pub(crate) const SLOWEST: f64 = 0.02;
 pub(crate) const FASTEST: f64 = 1000.0;
 
 /// The frames per second of movies: as asked for, or by the speed of the data's time.
-pub(super) fn frames_per_second(request: &PictureRequest, config: &RenderConfig, times: &TimeLabels) -> Result<f64> {
+pub(in crate::picture) fn frames_per_second(
+    request: &PictureRequest,
+    config: &RenderConfig,
+    times: &TimeLabels,
+) -> Result<f64> {
     let Some(speed) = request.speed else { return Ok(request.fps) };
     let time = |frame: Option<&usize>| frame.and_then(|frame| times.times().get(*frame)).copied();
     let (Some(first), Some(last)) = (time(config.frames.first()), time(config.frames.last())) else {

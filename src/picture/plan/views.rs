@@ -3,11 +3,11 @@
 use super::annotations::picture_margins;
 use super::axes::Axes;
 use super::camera_path::{Stand, is_moving, stands};
-use super::request::PictureRequest;
-use super::values::ModeName;
+use super::modes::mode_name;
 use crate::base::error::Result;
 use crate::base::grid::Grid;
-use crate::picture::modes::mode_name;
+use crate::picture::request::PictureRequest;
+use crate::picture::values::ModeName;
 use crate::render::annotate::Margins;
 use crate::view::camera::{Camera, View};
 
@@ -15,7 +15,7 @@ use crate::view::camera::{Camera, View};
 const USUAL: [f64; 2] = [30.0, 30.0];
 
 /// All views, including those of orbits and of key frames, which have one for each of the frames.
-pub(super) fn views(request: &PictureRequest, grid: &Grid, frames: &[usize]) -> Result<Vec<View>> {
+pub(in crate::picture) fn views(request: &PictureRequest, grid: &Grid, frames: &[usize]) -> Result<Vec<View>> {
     if let Some(path) = &request.key_frames {
         return in_one_scale(request, &stands(path, frames)?, grid);
     }
@@ -69,7 +69,7 @@ fn beside(views: Vec<View>, zooms: &[f64], grid: &Grid, around: Margins) -> Resu
 }
 
 /// The views with the scale and the centre that they have for a grid.
-pub(super) fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
+pub(in crate::picture) fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
     let fixed = |view: &View| {
         let camera = Camera::new(view, grid)?;
         Ok(View { scale: Some(camera.scale), center: Some(camera.beside(0.0)), ..*view })
@@ -78,7 +78,7 @@ pub(super) fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>> {
 }
 
 /// The view of the only slice, if it is to be seen face-on.
-pub(super) fn face_on(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<Option<View>> {
+pub(in crate::picture) fn face_on(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<Option<View>> {
     let has_no_view = request.view.is_empty() && request.orbit == 1 && !is_moving(request);
     match request.slice.as_slice() {
         [only] if has_no_view && mode_name(request) == ModeName::Slice => {

@@ -1,12 +1,12 @@
 //! The default range of colours, taken from small pictures of an overview.
 
-use super::report::unit;
-use super::reporter::Reporter;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
 use crate::base::progress::{Progress, Silent};
 use crate::base::sample::SampleType;
 use crate::colour::{Clear, Common, Distribution, Norm, TransferFunction};
+use crate::picture::report::unit;
+use crate::picture::reporter::Reporter;
 use crate::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
 use crate::render::{check, render, stride};
 use crate::source::ArraySource;
@@ -44,7 +44,7 @@ const MEMORY_SHARE: usize = 32;
 const MOST_OF_DISTRIBUTION: usize = 1 << 20;
 
 /// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview.
-pub(super) fn distribution(
+pub(in crate::picture) fn distribution(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     reporter: &dyn Reporter,
@@ -54,7 +54,7 @@ pub(super) fn distribution(
 }
 
 /// The same for these frames.
-pub(super) fn distribution_of_frames(
+pub(in crate::picture) fn distribution_of_frames(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     frames: &[usize],
@@ -229,17 +229,17 @@ fn pictures(
 
 /// Which ranges are needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Needed {
-    pub(super) of_pictures: bool,
-    pub(super) of_errors: bool,
+pub(in crate::picture) struct Needed {
+    pub(in crate::picture) of_pictures: bool,
+    pub(in crate::picture) of_errors: bool,
 }
 
 /// The ranges of the pictures and of their errors.
-pub(super) struct Ranges {
-    pub(super) values: (f64, f64),
+pub(in crate::picture) struct Ranges {
+    pub(in crate::picture) values: (f64, f64),
     /// The smallest value above 0, if there is one.
     positive: Option<f64>,
-    pub(super) errors: (f64, f64),
+    pub(in crate::picture) errors: (f64, f64),
     /// The values of small pictures.
     all: Distribution,
 }
@@ -254,7 +254,7 @@ impl Ranges {
     /// The ranges in small pictures, if any are needed: of pictures, or of their errors. The frames of the pictures are
     /// spread over the archive, so the ranges do not depend on the frames to render. If the pictures are empty, the
     /// range is (0, 1). Errors begin at 0.
-    pub(super) fn small(
+    pub(in crate::picture) fn small(
         scene: &mut dyn Scene,
         config: &RenderConfig,
         Needed { of_pictures, of_errors }: Needed,
@@ -285,7 +285,7 @@ impl Ranges {
     }
 
     /// The ranges of pictures of a few of some frames. `render` gives them, row by row.
-    pub(super) fn of_pictures(
+    pub(in crate::picture) fn of_pictures(
         frames: &[usize],
         render: impl FnOnce(&[usize], &mut dyn FnMut(&[f32])) -> Result<()>,
     ) -> Result<Self> {
@@ -309,13 +309,13 @@ impl Ranges {
     }
 
     /// The values that show the background, if small pictures have much empty space.
-    pub(super) fn clear(&self, range: (f64, f64)) -> Option<(Clear, Common)> {
+    pub(in crate::picture) fn clear(&self, range: (f64, f64)) -> Option<(Clear, Common)> {
         Clear::empty_space(&self.all, range)
     }
 
     /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would
     /// take most of the colours do not count.
-    pub(super) fn stretch(&self, colours: &TransferFunction) -> Result<TransferFunction> {
+    pub(in crate::picture) fn stretch(&self, colours: &TransferFunction) -> Result<TransferFunction> {
         let ((lo, hi), most) = (colours.range(), self.values.1);
         if !(0.0 < most && most < hi) {
             return Ok(colours.clone());
@@ -324,12 +324,12 @@ impl Ranges {
     }
 
     /// The range from 0 to the largest value.
-    pub(super) fn up_from_zero(&self) -> (f64, f64) {
+    pub(in crate::picture) fn up_from_zero(&self) -> (f64, f64) {
         (0.0, self.values.1)
     }
 
     /// The default range of colours.
-    pub(super) fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
+    pub(in crate::picture) fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
         const DECADES: f64 = 1e-4;
         let (lo, hi) = self.values;
         if norm == Norm::Log {

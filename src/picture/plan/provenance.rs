@@ -2,19 +2,19 @@
 
 use super::colouring::Colouring;
 use super::modes::mode_name;
-use super::request::PictureRequest;
-use super::values::{HexColour, ModeName};
 use crate::base::choice::Choice;
 use crate::base::grid::Grid;
 use crate::base::time_labels::TimeLabels;
 use crate::colour::Scale;
 use crate::file::CoefficientFile;
 use crate::file::report::BoundReport;
+use crate::picture::request::PictureRequest;
+use crate::picture::values::{HexColour, ModeName};
 use crate::render::sink::{Provenance, Shows};
 use crate::render::{Limit, Mode, Pixel, RenderConfig, Surface};
 
 /// The settings that pictures are rendered with.
-pub(super) fn provenance(
+pub(in crate::picture) fn provenance(
     request: &PictureRequest,
     grid: &Grid,
     config: &RenderConfig,
@@ -121,7 +121,7 @@ fn in_colours(provenance: Provenance, colouring: &Colouring, scale: &Scale) -> P
 }
 
 /// The settings stored in pictures of errors.
-pub(super) fn error_provenance(provenance: &Provenance, colouring: &Colouring) -> Provenance {
+pub(in crate::picture) fn error_provenance(provenance: &Provenance, colouring: &Colouring) -> Provenance {
     let provenance = Provenance {
         shows: Shows::CertifiedError,
         colormap: None,
