@@ -22,8 +22,7 @@ pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
     };
     match inputs.iter().find(|input| replaces(input)) {
         Some(input) => {
-            let (output, input) = (output.display(), input.display());
-            Err(Error::usage(format!("{output}: would replace the input {input}; name another output")))
+            Err(Error::path(output, format!("would replace the input {}; name another output", input.display())))
         }
         None => Ok(()),
     }

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// The text that `--json` prints.
 pub fn report_text(report: &impl Serialize) -> Result<String> {
     let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
-    text.map(|text| text + "\n").map_err(|e| Error::usage(format!("--json: {e}")))
+    text.map(|text| text + "\n").map_err(|e| Error::setting("json", e.to_string()))
 }
 
 /// The object that `--json` prints. If the meaning of a key changes, so does `schema`.

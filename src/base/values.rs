@@ -124,7 +124,7 @@ impl FrameRange {
     pub fn resolve(&self, frames: Option<usize>) -> Result<(usize, usize, Option<usize>)> {
         let from_end = |n: i64| match frames {
             Some(all) => Ok((all as i64).saturating_add(n).max(0)),
-            None => Err(Error::usage("--frames: a stream cannot be counted from its end")),
+            None => Err(Error::setting("frames", "a stream cannot be counted from its end")),
         };
         let place = |n: i64| if n < 0 { from_end(n) } else { Ok(n) };
         let start = self.start.map_or(Ok(0), place)? as usize;
@@ -136,7 +136,7 @@ impl FrameRange {
                 None | Some(0) => String::new(),
                 Some(n) => format!("; frames are numbered 0 to {}", n - 1),
             };
-            return Err(Error::usage(format!("--frames: there is no such frame{all}")));
+            return Err(Error::setting("frames", format!("there is no such frame{all}")));
         }
         Ok((start, self.step, count))
     }
@@ -214,7 +214,7 @@ impl RegionSpec {
         };
         if !grid.whole().contains(&region) || region.is_empty() {
             let [x, y, z] = grid.dims;
-            return Err(Error::usage(format!("--region: empty, or not within the volume of {x}x{y}x{z} voxels")));
+            return Err(Error::setting("region", format!("empty, or not within the volume of {x}x{y}x{z} voxels")));
         }
         Ok(region)
     }

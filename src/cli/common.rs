@@ -2,7 +2,7 @@
 
 use super::terminal::{ProgressKind, TerminalProgress};
 use super::values::Size;
-use super::{note_text, print};
+use super::{messages, note_text, print};
 use crate::base::error::{Error, Note, Result};
 use crate::base::progress::Progress;
 use crate::base::report::report_text;
@@ -97,11 +97,11 @@ impl CommonArgs {
 
 impl Reporter for CommonArgs {
     fn note(&self, text: Arguments<'_>) {
-        Self::note(self, text);
+        Self::note(self, messages::of_picture(&text.to_string()));
     }
 
     fn detail(&self, text: Arguments<'_>) {
-        Self::detail(self, text);
+        Self::detail(self, messages::of_picture(&text.to_string()));
     }
 
     fn note_source(&self, note: &Note) {

@@ -11,9 +11,16 @@ pub fn of_error(error: &Error, command: &Command) -> String {
         Error::Setting { setting, problem, .. } => {
             format!("error: {}: {}", option(setting, command), with_options(problem, command))
         }
-        other => format!("error: {other}"),
+        other => format!("error: {}", with_options(&other.to_string(), command)),
     };
     error.remedy().map(|remedy| format!("{text}\n  tip: {}", advice(&remedy))).unwrap_or(text)
+}
+
+/// The text of a note about pictures: with options in place of the fields that it has in backquotes.
+#[cfg(feature = "cli")]
+pub(super) fn of_picture(text: &str) -> String {
+    let worded = |(n, part): (usize, &str)| if n % 2 == 1 { format!("--{}", name(part)) } else { part.into() };
+    text.split('`').enumerate().map(worded).collect()
 }
 
 /// The text of a note, with advice if it has a remedy.

@@ -101,7 +101,7 @@ pub(super) fn write_partial(session: &Session, request: &PictureRequest, reporte
     refuse_for_partial(request)?;
     let opened = Opened::new(session, request, reporter)?;
     let Some(file) = opened.file.clone() else {
-        return Err(Error::usage("--partial: takes a coefficient file, not frames; convert them first"));
+        return Err(Error::setting("partial", "takes a coefficient file, not frames; convert them first"));
     };
     let Planned { look, source, config, views, voxels } = plan_partial(request, &opened, &file, session.memory)?;
     let first = source.frames[0];
@@ -130,20 +130,21 @@ pub(super) fn write_partial(session: &Session, request: &PictureRequest, reporte
 
 /// An error if the pictures are not sums.
 fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
-    let instead = "render them whole, perhaps with --lod, or each shard of time by itself: its frames are whole";
+    let instead = "render them whole, perhaps with `lod`, or each shard of time by itself: its frames are whole";
     let what = match mode_name(request) {
         ModeName::Projection if request.error == Limit::Expected && request.tolerance.is_some() => {
-            return Err(Error::usage(
-                "--error expected: weighs all blocks of a picture, and a part has some; take certified",
+            return Err(Error::setting(
+                "error",
+                "expected weighs all blocks of a picture, and a part has some; take certified",
             ));
         }
         ModeName::Projection => return Ok(()),
         ModeName::Mip => "largest values along rays are no sums, and lie between voxels on both sides of a border",
         ModeName::Composite => "near samples hide far ones, so composites are no sums",
         ModeName::Iso => "near surfaces hide far ones, so they are no sums",
-        ModeName::Slice => "slices are no sums, and show single samples; --region is not needed for them",
+        ModeName::Slice => "slices are no sums, and show single samples; `region` is not needed for them",
     };
-    Err(Error::usage(format!("--partial: {what}; {instead}")))
+    Err(Error::setting("partial", format!("{what}; {instead}")))
 }
 
 /// Plans a partial sum: the settings that all parts share, and its own views, frames and voxels.

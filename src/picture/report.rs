@@ -53,7 +53,7 @@ pub(super) fn note_errors(request: &PictureRequest, report: &RenderReport, repor
     let estimates = report.views.iter().filter(|view| view.splat_error_is_estimate);
     let estimate = estimates.map(|view| view.stated_splat_error).fold(0.0, f64::max);
     if estimate > 0.0 {
-        reporter.note(format_args!("--fast adds an error of about {estimate:.1e} of the range (an estimate)"));
+        reporter.note(format_args!("`fast` adds an error of about {estimate:.1e} of the range (an estimate)"));
     }
     if let Some(error) = report.certified_error {
         reporter.note(format_args!("no pixel is off by more than {error:.4e}"));

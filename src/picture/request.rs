@@ -13,6 +13,7 @@ use crate::render::sink::{Depth, PictureFormat};
 use crate::render::{Limit, Quantity, SplatSource};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -206,17 +207,16 @@ impl PictureRequest {
     /// # Errors
     /// A text that is no JSON object, an unknown field, a wrong value, or fields that exclude one another.
     pub fn from_json(json: &str) -> Result<Self> {
-        let given: Map<String, Value> = serde_json::from_str(json).map_err(|e| Error::usage(e.to_string()))?;
+        let given: Map<String, Value> = serde_json::from_str(json).map_err(wrong)?;
         for (name, value) in &given {
             let alone = Map::from_iter([(name.clone(), value.clone())]);
-            serde_json::from_value::<Self>(alone.into())
-                .map_err(|e| Error::usage(format!("--{}: {e}", option(name))))?;
+            serde_json::from_value::<Self>(alone.into()).map_err(|e| wrong(format!("`{name}`: {e}")))?;
         }
         let pairs = given.keys().flat_map(|a| given.keys().map(move |b| (a, b)));
         if let Some((a, b)) = pairs.into_iter().find(|(a, b)| exclude(a, b)) {
-            return Err(Error::usage(format!("--{}: cannot be used with --{}", option(a), option(b))));
+            return Err(wrong(format!("`{a}` cannot be used with `{b}`")));
         }
-        serde_json::from_value(given.into()).map_err(|e| Error::usage(e.to_string()))
+        serde_json::from_value(given.into()).map_err(wrong)
     }
 
     /// The options of `wavesplat-render` that ask for the same.
@@ -247,6 +247,11 @@ impl PictureRequest {
             _ => Map::new(),
         }
     }
+}
+
+/// The error of a text that is no request.
+fn wrong(what: impl Display) -> Error {
+    Error::setting("request", what.to_string())
 }
 
 /// Fields for how finished pictures are coloured and written.

@@ -151,11 +151,11 @@ fn kept(
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
     if is_part(path) {
-        return Error::usage(format!("{}: is a part of a picture; --sum makes pictures of parts", path.display()));
+        return Error::path(path, "is a part of a picture; `sum` makes pictures of parts");
     }
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });
     if !is_coefficient_name(path) && (foreign || path.is_dir()) {
-        return Error::usage(format!("{}: not a coefficient file; {FRAMES_HINT}", public_name(path).display()));
+        return Error::path(public_name(path), format!("not a coefficient file; {FRAMES_HINT}"));
     }
     error
 }

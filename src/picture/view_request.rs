@@ -87,8 +87,9 @@ impl ViewRequest {
     /// # Errors
     /// A text that is no request, or one for too much.
     pub fn read(json: &[u8]) -> Result<Self> {
-        let request: Self = serde_json::from_slice(json).map_err(|e| Error::usage(format!("not a request: {e}")))?;
-        request.check().map_or(Ok(request), |what| Err(Error::usage(what)))
+        let request: Self =
+            serde_json::from_slice(json).map_err(|e| Error::setting("request", format!("not a request: {e}")))?;
+        request.check().map_or(Ok(request), |what| Err(Error::setting("request", what)))
     }
 
     /// What is wrong with the request, if anything is.

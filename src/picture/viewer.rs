@@ -6,7 +6,7 @@ use super::plan::opened::Opened;
 use super::plan::ranges::distribution;
 use super::plan::ranges::distribution_of_frames;
 use super::reporter::Caller;
-use super::request::PictureRequest;
+use super::request::{PictureRequest, option};
 use super::series::series_csv;
 use super::session::Session;
 use super::values::{AxisPosition, PointSpec};
@@ -104,7 +104,7 @@ impl ViewerSession {
 
     /// The facts about the scene for the page, as JSON.
     pub fn facts(&self) -> Result<String> {
-        serde_json::to_string(&self.known()?).map_err(|e| Error::usage(e.to_string()))
+        serde_json::to_string(&self.known()?).map_err(|e| Error::setting("facts", e.to_string()))
     }
 
     fn known(&self) -> Result<Facts> {
@@ -140,7 +140,7 @@ impl ViewerSession {
         let mut plan = Plan::new(&self.session, &request, &Caller(work))?;
         plan.config.frames.retain(|frame| view.wants(*frame));
         if plan.config.frames.is_empty() {
-            return Err(Error::usage("frames: the archive has none of these"));
+            return Err(Error::setting("frames", "the archive has none of these"));
         }
         let sink = SinkConfig { shown: plan.config.shown(), ..plan.sinks(&request).config()? };
         view.check_memory(sink.pixel.numbers(), plan.config.memory)?;
@@ -206,7 +206,8 @@ impl ViewerSession {
     pub fn command(&self, view: &ViewRequest, saved: Saved) -> String {
         let request = PictureRequest { certify: false, ..view.applied_to(&self.base) };
         let inputs = self.session.paths().iter().map(|path| path.to_string_lossy().into_owned());
-        let words = request.words().into_iter().chain(view.certify.then(|| "--error-image=error.npy".into()));
+        let words =
+            request.words().into_iter().chain(view.certify.then(|| format!("--{}=error.npy", option("error_image"))));
         let all = inputs.chain(self.input_words.iter().cloned()).chain(words).chain(["-o".into(), saved.name().into()]);
         all.fold("wavesplat-render".into(), |line, word| line + " " + &quoted(&word))
     }

@@ -42,7 +42,7 @@ pub(in crate::picture) fn note_title(
 ) {
     let frame = config.frames.first().copied().unwrap_or(0);
     if let Some(shown) = annotation.cut_title(request.size.0, frame).filter(|_| !is_page(request)) {
-        reporter.note(format_args!("--title: the picture is too narrow for all of it; it shows '{shown}'"));
+        reporter.note(format_args!("`title`: the picture is too narrow for all of it; it shows '{shown}'"));
     }
 }
 

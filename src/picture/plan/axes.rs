@@ -36,7 +36,7 @@ impl Axes {
     }
 
     /// The number of the axis with a name, or with the only name that begins like this.
-    pub(crate) fn find(&self, option: &str, name: &str) -> Result<usize> {
+    pub(crate) fn find(&self, field: &'static str, name: &str) -> Result<usize> {
         let is = |matches: &dyn Fn(&str) -> bool| -> Vec<usize> {
             (0..3).filter(|a| self.0[*a].names.iter().any(|own| matches(&own.to_lowercase()))).collect()
         };
@@ -47,14 +47,14 @@ impl Axes {
             [axis] => Ok(axis),
             _ => {
                 let known: Vec<String> = self.0.iter().map(|axis| axis.names.join(" or ")).collect();
-                Err(Error::usage(format!("{option}: no axis '{name}'; the axes are {}", known.join(", "))))
+                Err(Error::setting(field, format!("no axis '{name}'; the axes are {}", known.join(", "))))
             }
         }
     }
 
     /// A place along an axis, in voxels.
-    pub(crate) fn voxel(&self, option: &str, axis: usize, place: &AxisPosition) -> Result<f64> {
-        self.0[axis].voxel(place).map_err(|what| Error::usage(format!("{option}: {what}")))
+    pub(crate) fn voxel(&self, field: &'static str, axis: usize, place: &AxisPosition) -> Result<f64> {
+        self.0[axis].voxel(place).map_err(|what| Error::setting(field, what))
     }
 
     /// Names, units and coordinates.

@@ -26,7 +26,7 @@ pub(in crate::picture) fn frames_of_views(
         return Ok(frames);
     }
     if views == 1 {
-        return Err(Error::usage("--over-time: turns the camera, so it needs --orbit N or several --view"));
+        return Err(Error::setting("over_time", "turns the camera, so it needs `orbit` N or several `view`"));
     }
     let at = |view: usize| frames.get(view * frames.len() / views).copied();
     Ok((0..views).filter_map(at).collect())

@@ -100,7 +100,7 @@ impl ColouringInput<'_> {
         let mut grey = targets.filter(|targets| targets.format == PictureFormat::Gray16);
         if let Some(name) = grey.next().and_then(|targets| targets.names.first()) {
             let what = "gray16 holds one number a pixel, and colours are three; take png, npy or rgb24";
-            return Err(Error::usage(format!("{}: {what}", name.display())));
+            return Err(Error::path(name, what));
         }
         refuse_for_colours(self.request)?;
         Ok(pixel)
@@ -131,7 +131,7 @@ fn background(request: &PictureRequest) -> Rgb {
 
 fn report_ranges((lo, hi): (f64, f64), ranges: &Ranges, found: Needed, reporter: &dyn Reporter) {
     if found.of_pictures || found.of_errors {
-        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
     }
     if found.of_errors {
         reporter.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
@@ -155,7 +155,7 @@ pub(in crate::picture) fn automatic_colours(
         let needed = Needed { of_pictures: true, of_errors: false };
         colours = Ranges::small(scene, config, needed, reporter)?.stretch(&colours)?;
         let (lo, hi) = colours.range();
-        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; --range sets them"));
+        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
     }
     if modes::suggests_opacities(request, &colours) {
         colours = suggested_opacities(request, scene, config, &colours, reporter)?;
@@ -175,7 +175,7 @@ pub(in crate::picture) fn note_surfaces(
     let (lo, hi) = file.source_range();
     for surface in surfaces.iter().filter(|surface| !(lo..=hi).contains(&surface.value)) {
         let value = surface.value;
-        reporter.note(format_args!("--iso {value}: no sample reaches it; they are from {lo:.4e} to {hi:.4e}"));
+        reporter.note(format_args!("`iso` {value}: no sample reaches it; they are from {lo:.4e} to {hi:.4e}"));
     }
 }
 
@@ -192,5 +192,5 @@ fn suggested_opacities(
     let volume: f64 = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).product();
     let path = volume.cbrt() / modes::opacity_unit(request, grid);
     let points = samples.opacities(colours.range(), path);
-    colours.with_opacity(&points).map_err(|what| Error::usage(format!("--opacity auto: {what}")))
+    colours.with_opacity(&points).map_err(|what| Error::setting("opacity", format!("auto: {what}")))
 }

@@ -68,7 +68,7 @@ fn region_of(request: &PictureRequest, whole: &Grid, lod: u32) -> Result<Option<
     let Some(region) = request.region.map(|r| r.resolve(whole)).transpose()? else { return Ok(None) };
     let region = region.every(1 << lod);
     if region.is_empty() {
-        return Err(Error::usage(format!("--region: holds no voxel with --lod {lod}")));
+        return Err(Error::setting("region", format!("holds no voxel with `lod` {lod}")));
     }
     Ok(Some(region))
 }
@@ -76,10 +76,10 @@ fn region_of(request: &PictureRequest, whole: &Grid, lod: u32) -> Result<Option<
 /// The sample error that `--tolerance` allows, in the unit of the samples.
 fn allowed_error(request: &PictureRequest, tolerance: f64, file: Option<&Metadata>) -> Result<f64> {
     let Some(file) = file.filter(|_| request.method == SplatSource::Coefficients) else {
-        return Err(Error::usage("--tolerance: leaves out coefficients, so it needs --method coefficients"));
+        return Err(Error::setting("tolerance", "leaves out coefficients, so it needs `method` coefficients"));
     };
     if !(0.0..=1.0).contains(&tolerance) {
-        return Err(Error::usage("--tolerance: a share of the value range, 0 to 1; 2 % is 0.02"));
+        return Err(Error::setting("tolerance", "a share of the value range, 0 to 1; 2 % is 0.02"));
     }
     let range = range_of_shares(file);
     let allowed = range_bound(tolerance, range);
@@ -87,7 +87,7 @@ fn allowed_error(request: &PictureRequest, tolerance: f64, file: Option<&Metadat
     if allowed < reached && request.error == Limit::Certified {
         let least = reached / (range.1 - range.0);
         let what = "the samples of the file are up to";
-        return Err(Error::usage(format!("--tolerance {tolerance:e}: {what} {least:.3e} of its range off")));
+        return Err(Error::setting("tolerance", format!("{tolerance:e}: {what} {least:.3e} of its range off")));
     }
     Ok(allowed)
 }

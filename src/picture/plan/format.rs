@@ -25,6 +25,6 @@ pub(in crate::picture) fn format_of(path: &Path) -> Result<PictureFormat> {
             other => format!("no pictures are written as .{other}"),
         };
         let formats = "take .png for a picture, .apng or .mp4 for a moving one, .html for a page, or webm gif npy y4m rgb24 gray16 exr";
-        Error::usage(format!("{}: {what}; {formats}", path.display()))
+        Error::path(path, format!("{what}; {formats}"))
     })
 }

@@ -24,35 +24,35 @@ pub(in crate::picture) fn mode_name(request: &PictureRequest) -> ModeName {
 /// An error if a field does not apply to the mode. `is_direct` is whether frames are splatted.
 pub(in crate::picture) fn check(request: &PictureRequest, is_direct: bool) -> Result<()> {
     let mode = mode_name(request);
-    let needs = |given: bool, option: &str, takes: fn(ModeName) -> bool| {
-        (given && !takes(mode)).then(|| format!("{option}: needs --mode {}", names(takes)))
+    let needs = |given: bool, field: &'static str, takes: fn(ModeName) -> bool| {
+        (given && !takes(mode)).then(|| (field, format!("needs `mode` {}", names(takes))))
     };
     let colours = || {
         (request.colormap.is_some() && mode.colours_samples())
-            .then(|| format!("--colormap: --mode {} takes its colours from --transfer-function", mode.name()))
+            .then(|| ("colormap", format!("`mode` {} takes its colours from `transfer_function`", mode.name())))
     };
-    let refused = needs(request.opacity.is_some(), "--opacity", ModeName::has_opacities)
-        .or_else(|| needs(request.opacity_unit.is_some(), "--opacity-unit", ModeName::has_opacities))
-        .or_else(|| needs(request.iso.is_some(), "--iso", ModeName::is_of_surfaces))
-        .or_else(|| needs(request.shade, "--shade", ModeName::has_opacities))
-        .or_else(|| needs(request.light.is_some(), "--light", ModeName::colours_samples))
-        .or_else(|| needs(request.slices.is_some(), "--slices", ModeName::has_slices))
+    let refused = needs(request.opacity.is_some(), "opacity", ModeName::has_opacities)
+        .or_else(|| needs(request.opacity_unit.is_some(), "opacity_unit", ModeName::has_opacities))
+        .or_else(|| needs(request.iso.is_some(), "iso", ModeName::is_of_surfaces))
+        .or_else(|| needs(request.shade, "shade", ModeName::has_opacities))
+        .or_else(|| needs(request.light.is_some(), "light", ModeName::colours_samples))
+        .or_else(|| needs(request.slices.is_some(), "slices", ModeName::has_slices))
         .or_else(colours)
         .or_else(|| request.transfer_function.as_ref().and_then(|_| refuse_colours(mode, is_direct)));
-    if let Some(what) = refused {
-        return Err(Error::usage(what));
+    if let Some((field, what)) = refused {
+        return Err(Error::setting(field, what));
     }
     let positive = request.opacity_unit.is_none_or(|unit| unit.is_finite() && unit > 0.0);
-    if positive { Ok(()) } else { Err(Error::usage("--opacity-unit: takes a length above 0")) }
+    if positive { Ok(()) } else { Err(Error::setting("opacity_unit", "takes a length above 0")) }
 }
 
 /// An error if slices are missing, or the mode takes none.
 pub(in crate::picture) fn check_slices(request: &PictureRequest) -> Result<()> {
     match (request.slice.is_empty(), request.mode) {
-        (true, Some(ModeName::Slice)) => Err(Error::usage("--mode slice: needs --slice, like --slice z=0.5")),
+        (true, Some(ModeName::Slice)) => Err(Error::setting("mode", "slice: needs `slice`, like `slice` z=0.5")),
         (true, _) | (false, None | Some(ModeName::Slice | ModeName::Composite)) => Ok(()),
         (false, Some(mode)) => {
-            Err(Error::usage(format!("--slice: needs --mode slice or composite, not {}", mode.name())))
+            Err(Error::setting("slice", format!("needs `mode` slice or composite, not {}", mode.name())))
         }
     }
 }
@@ -63,19 +63,19 @@ fn names(has: impl Fn(ModeName) -> bool) -> String {
     modes.map(|(name, ..)| *name).collect::<Vec<_>>().join(" or ")
 }
 
-/// Why --transfer-function does not apply to the mode, if it does not.
-fn refuse_colours(mode: ModeName, is_direct: bool) -> Option<String> {
+/// Why `transfer_function` does not apply to the mode, if it does not.
+fn refuse_colours(mode: ModeName, is_direct: bool) -> Option<(&'static str, String)> {
     let why = match mode {
         ModeName::Composite | ModeName::Iso => return None,
         ModeName::Projection if is_direct => return None, // frames are turned into colours before they are splatted
         ModeName::Projection => {
-            "with a coefficient file, it colours samples along the ray (--mode composite); --colormap colours \
-             projections, and wavesplat convert --transfer-function makes files of colours"
+            "with a coefficient file, it colours samples along the ray (`mode` composite); `colormap` colours \
+             projections, and wavesplat convert `transfer_function` makes files of colours"
         }
-        ModeName::Mip => "--mode mip takes --colormap",
-        ModeName::Slice => "--slice takes --colormap",
+        ModeName::Mip => "`mode` mip takes `colormap`",
+        ModeName::Slice => "`slice` takes `colormap`",
     };
-    Some(format!("--transfer-function: {why}"))
+    Some(("transfer_function", why.into()))
 }
 
 /// The name of the colours of a composite, or of coloured frames.
@@ -115,7 +115,7 @@ pub(in crate::picture) fn colours_of_file(
 ) -> Result<Option<TransferFunction>> {
     let colours_samples = mode_name(request).colours_samples();
     let Some(name) = sample_colours(request).filter(|_| colours_samples) else { return Ok(None) };
-    let colours = open_colours("--transfer-function", name)?;
+    let colours = open_colours("transfer_function", name)?;
     stretched(colours, request.range, || Ok(file.source_range())).map(Some)
 }
 
@@ -130,7 +130,7 @@ pub(in crate::picture) fn mode(request: &PictureRequest, colours: Option<&Transf
                 Some(Opacities::Points(points)) => transfer.with_opacity(&points.0),
                 Some(Opacities::Auto) | None => Ok(transfer.clone()),
             };
-            let transfer = transfer.map_err(|what| Error::usage(format!("--opacity: {what}")))?;
+            let transfer = transfer.map_err(|what| Error::setting("opacity", what))?;
             let light = (request.shade || request.light.is_some()).then(|| lamp(request));
             Mode::Composite { transfer, unit: request.opacity_unit, slices, light, planes: Vec::new() }
         }
@@ -151,5 +151,5 @@ fn lamp(request: &PictureRequest) -> Light {
 
 /// The colours of samples.
 fn needed(colours: Option<&TransferFunction>) -> Result<&TransferFunction> {
-    colours.ok_or_else(|| Error::usage("--mode: needs --transfer-function"))
+    colours.ok_or_else(|| Error::setting("mode", "needs `transfer_function`"))
 }

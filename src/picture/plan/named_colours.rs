@@ -6,10 +6,10 @@ use crate::colour::TransferFunction;
 use crate::picture::reporter::Reporter;
 use crate::source::{FrameSource, value_range};
 
-/// Opens the colours that an option names.
-pub fn open_colours(option: &str, name: &str) -> Result<TransferFunction> {
+/// Opens the colours that a field names.
+pub fn open_colours(field: &'static str, name: &str) -> Result<TransferFunction> {
     TransferFunction::open(name).map_err(|error| match error {
-        Error::Path { path, problem, .. } => Error::usage(format!("{option} {}: {problem}", path.display())),
+        Error::Path { path, problem, .. } => Error::setting(field, format!("{}: {problem}", path.display())),
         other => other,
     })
 }
@@ -42,13 +42,13 @@ pub fn colours_of_source(
 ) -> Result<TransferFunction> {
     let all = || {
         if is_piped {
-            let what = "standard input is read once: give --range LO,HI, the values of the first and the last colour";
-            return Err(Error::usage(format!("--transfer-function {name}: {what}")));
+            let what = "standard input is read once: give `range` LO,HI, the values of the first and the last colour";
+            return Err(Error::setting("transfer_function", format!("{name}: {what}")));
         }
         let progress = reporter.progress("values", "frames");
         let (lo, hi) = value_range(source, missing_value, progress.as_ref())?.unwrap_or((0.0, 1.0));
-        reporter.detail(format_args!("values from {lo:.4e} to {hi:.4e}; --range sets the range of the colours"));
+        reporter.detail(format_args!("values from {lo:.4e} to {hi:.4e}; `range` sets the range of the colours"));
         Ok((lo, hi))
     };
-    stretched(open_colours("--transfer-function", name)?, range, all)
+    stretched(open_colours("transfer_function", name)?, range, all)
 }

@@ -59,7 +59,10 @@ impl Opened {
         reporter: &dyn Reporter,
     ) -> Result<Self> {
         if path == Path::new(STANDARD) {
-            return Err(Error::usage("-: a coefficient file cannot come from a pipe, since it is read from its end"));
+            return Err(Error::path(
+                STANDARD,
+                "a coefficient file cannot come from a pipe, since it is read from its end",
+            ));
         }
         modes::check(request, false)?;
         let file = session.file(request.skip_damaged)?;
@@ -67,7 +70,7 @@ impl Opened {
         let file = file.with_exaggeration(exaggeration);
         let lod = level_of_detail(request, &file)?;
         if request.lod == Detail::Auto {
-            reporter.note(format_args!("--lod auto takes level {lod} of {}", file.coarsest_detail()));
+            reporter.note(format_args!("`lod` auto takes level {lod} of {}", file.coarsest_detail()));
         }
         let file = Arc::new(file.with_detail(lod)?);
         note_irregular_axes(&file, reporter)?;
@@ -112,7 +115,7 @@ fn exaggeration(request: &PictureRequest, grid: &Grid, reporter: &dyn Reporter) 
     let factor = grid.sensible_exaggeration();
     if factor != 1.0 {
         let what = "as tall as they are, since the volume is nearly flat";
-        reporter.note(format_args!("heights are drawn {factor} times {what}; --exaggerate 1 draws them true"));
+        reporter.note(format_args!("heights are drawn {factor} times {what}; `exaggerate` 1 draws them true"));
     }
     factor
 }
@@ -145,19 +148,19 @@ fn level_of_detail(request: &PictureRequest, file: &CoefficientFile) -> Result<u
 /// An error if a field or the input is not for frames.
 fn refuse_for_frames(session: &Session, request: &PictureRequest) -> Result<()> {
     if request.skip_damaged {
-        return Err(Error::usage("--skip-damaged: is for a coefficient file"));
+        return Err(Error::setting("skip_damaged", "is for a coefficient file"));
     }
     if request.lod != Detail::Level(0) {
-        return Err(Error::usage("--lod: is for a coefficient file"));
+        return Err(Error::setting("lod", "is for a coefficient file"));
     }
     if request.method == SplatSource::Coefficients {
-        return Err(Error::usage(format!("takes one coefficient file; {FRAMES_HINT}")));
+        return Err(Error::setting("inputs", format!("takes one coefficient file; {FRAMES_HINT}")));
     }
     if session.paths() == [PathBuf::from(STANDARD)] {
-        let what = "--method direct reads frames more than once, so they cannot come from standard input";
-        return Err(Error::usage(what));
+        let what = "direct reads frames more than once, so they cannot come from standard input";
+        return Err(Error::setting("method", what));
     }
     Ok(())
 }
 
-pub(in crate::picture) const FRAMES_HINT: &str = "convert frames first, or render them with --method direct";
+pub(in crate::picture) const FRAMES_HINT: &str = "convert frames first, or render them with `method` direct";

@@ -8,7 +8,7 @@ use crate::picture::request::PictureRequest;
 use crate::picture::values::SliceSpec;
 use crate::render::{Mode, Plane, RenderConfig};
 
-const OPTION: &str = "--slice";
+const FIELD: &str = "slice";
 
 /// The planes of a mode.
 pub(in crate::picture) fn planes_of(mode: &Mode) -> Vec<Plane> {
@@ -32,8 +32,8 @@ pub(in crate::picture) fn with_planes(mode: Mode, planes: Vec<Plane>) -> Mode {
 /// The number of the axis, and the position in voxels, of each slice.
 fn positions(request: &PictureRequest, axes: &Axes) -> Result<Vec<(usize, f64)>> {
     let position = |slice: &SliceSpec| {
-        let axis = axes.find(OPTION, &slice.axis)?;
-        Ok((axis, axes.voxel(OPTION, axis, &slice.position)?))
+        let axis = axes.find(FIELD, &slice.axis)?;
+        Ok((axis, axes.voxel(FIELD, axis, &slice.position)?))
     };
     request.slice.iter().map(position).collect()
 }
@@ -61,7 +61,7 @@ pub(in crate::picture) fn set_planes(
     let planes: Vec<Plane> = positions(request, axes)?.into_iter().map(plane).collect();
     if let Some(outside) = planes.iter().find(|plane| !plane.is_within(&region)) {
         let at = axes.text(outside.axis, outside.at * f64::from(1_u32 << lod));
-        return Err(Error::usage(format!("{OPTION}: {at} is outside of --region")));
+        return Err(Error::setting(FIELD, format!("{at} is outside of `region`")));
     }
     config.mode = with_planes(config.mode.clone(), planes);
     Ok(())

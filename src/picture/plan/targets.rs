@@ -57,7 +57,7 @@ impl AllTargets {
         check_format(request, pictures.format, request.is_annotated())?;
         let errors = request.error_image.as_ref().map(|path| Targets::new(path, None, config)).transpose()?;
         if request.error_image.as_deref() == Some(Path::new(STANDARD)) {
-            return Err(Error::usage("--error-image: needs a file, not standard output"));
+            return Err(Error::setting("error_image", "needs a file, not standard output"));
         }
         let targets = Self { pictures, errors };
         targets.check_depth(request.depth)?;
@@ -72,7 +72,7 @@ impl AllTargets {
     fn check_depth(&self, depth: Depth) -> Result<()> {
         if depth == Depth::Sixteen && !self.all().any(|targets| targets.format.is_png()) {
             let what = "is for png, apng and sheet; gray16 always has 16 bits, npy and exr hold floats";
-            return Err(Error::usage(format!("--depth 16: {what}")));
+            return Err(Error::setting("depth", format!("16 {what}")));
         }
         Ok(())
     }
@@ -89,8 +89,8 @@ impl AllTargets {
                 let frames: Vec<usize> = targets.shown(n, config).into_iter().map(|(_, frame)| frame).collect();
                 let paths = Sink::paths(name, targets.format, &frames)?;
                 if let Some(twice) = paths.into_iter().find(|path| !written.insert(path.clone())) {
-                    let what = "would be written twice; give the pictures, --error-image and --sidecar different names";
-                    return Err(Error::usage(format!("{}: {what}", twice.display())));
+                    let what = "would be written twice; give the pictures, `error_image` and `sidecar` different names";
+                    return Err(Error::path(twice, what));
                 }
             }
         }
@@ -118,7 +118,7 @@ impl AllTargets {
 
 fn check_sidecar(path: &Path, inputs: &[PathBuf], force: bool) -> Result<()> {
     if path == Path::new(STANDARD) {
-        return Err(Error::usage("--sidecar: needs a file; --json prints the report"));
+        return Err(Error::setting("sidecar", "needs a file; `json` prints the report"));
     }
     spare_inputs(inputs, path)?;
     Output::check(path, force || is_ours(path))
@@ -135,8 +135,8 @@ fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
     }
     let (name, pixels) = (output.display(), " -pix_fmt yuv420p");
     let inputs: Vec<_> = inputs.iter().map(|input| input.to_string_lossy()).collect();
-    let pipe = format!("wavesplat-render {} -o - --format y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
-    Err(Error::usage(format!("{name}: write .mp4, .webm or .gif, or type: {pipe}")))
+    let pipe = format!("wavesplat-render {} -o - `format` y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
+    Err(Error::path(output, format!("write .mp4, .webm or .gif, or type: {pipe}")))
 }
 
 /// An error if a format cannot hold colours or annotations.
@@ -147,13 +147,13 @@ pub(in crate::picture) fn check_format(
 ) -> Result<()> {
     let in_colours = request.colormap.is_some();
     if format == PictureFormat::Exr && in_colours {
-        return Err(Error::usage("--colormap: an .exr holds numbers, not colours; take png with --depth 16"));
+        return Err(Error::setting("colormap", "an .exr holds numbers, not colours; take png with `depth` 16"));
     }
     let why = match format {
         PictureFormat::Gray16 => "gray16 has no colours to draw in; take png, or another format",
         PictureFormat::Exr => "an .exr holds numbers to compute with; take png, or another format",
-        PictureFormat::Npy if !in_colours => "an .npy holds values to compute with; give --colormap for colours",
+        PictureFormat::Npy if !in_colours => "an .npy holds values to compute with; give `colormap` for colours",
         _ => return Ok(()),
     };
-    if is_annotated { Err(Error::usage(format!("--annotate: {why}"))) } else { Ok(()) }
+    if is_annotated { Err(Error::setting("annotate", why)) } else { Ok(()) }
 }

@@ -30,7 +30,7 @@ pub(in crate::picture) fn clear_values(
             let is_zero = empty.value.abs() < 1e-3 * (hi - lo);
             let (value, percent) = (if is_zero { 0.0 } else { empty.value as f32 }, (100.0 * empty.share).round());
             reporter.note(format_args!(
-                "values near {value}, as in {percent} % of the pixels, show the background; --clear none colours them"
+                "values near {value}, as in {percent} % of the pixels, show the background; `clear` none colours them"
             ));
             Some(clear)
         }
@@ -41,17 +41,17 @@ pub(in crate::picture) fn clear_values(
 pub(in crate::picture) fn refuse_for_colours(request: &PictureRequest) -> Result<()> {
     if request.colormap.is_some() {
         let what = "the colours are fixed, since the samples were turned into them";
-        return Err(Error::usage(format!("--colormap: {what}")));
+        return Err(Error::setting("colormap", what));
     }
     match request.norm {
         Norm::Linear => Ok(()),
-        Norm::Log => Err(Error::usage("--norm: is for values with a --colormap; these samples are colours")),
+        Norm::Log => Err(Error::setting("norm", "is for values with a `colormap`; these samples are colours")),
     }
 }
 
 /// The colours of values, over the range if one was given.
 pub(in crate::picture) fn value_colours(request: &PictureRequest) -> Result<TransferFunction> {
-    let map = open_colours("--colormap", request.colormap.as_deref().unwrap_or("viridis"))?;
+    let map = open_colours("colormap", request.colormap.as_deref().unwrap_or("viridis"))?;
     request.range.map_or(Ok(map.clone()), |range| map.over(range.0.into()))
 }
 
@@ -74,7 +74,7 @@ pub(in crate::picture) fn value_spread(
     if request.range.is_none() && (most < lo || hi < least) {
         let name = request.colormap.as_deref().unwrap_or_default();
         reporter.note(format_args!(
-            "{name} has colours of {lo:.4e} to {hi:.4e}, and values are {least:.4e} to {most:.4e}: --range stretches them"
+            "{name} has colours of {lo:.4e} to {hi:.4e}, and values are {least:.4e} to {most:.4e}: `range` stretches them"
         ));
     }
     Ok(((lo, hi), norm))

@@ -82,7 +82,7 @@ pub(in crate::picture) fn face_on(request: &PictureRequest, axes: &Axes, grid: &
     let has_no_view = request.view.is_empty() && request.orbit == 1 && !is_moving(request);
     match request.slice.as_slice() {
         [only] if has_no_view && mode_name(request) == ModeName::Slice => {
-            view_across(request, axes.find("--slice", &only.axis)?, grid).map(Some)
+            view_across(request, axes.find("slice", &only.axis)?, grid).map(Some)
         }
         _ => Ok(None),
     }

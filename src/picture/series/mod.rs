@@ -103,7 +103,7 @@ fn series_format(request: &PictureRequest, session: &Session) -> Result<Format> 
     match output.extension().and_then(|e| e.to_str()) {
         Some("csv") => Ok(Format::Csv),
         Some("svg") => Ok(Format::Svg),
-        _ => Err(Error::usage(format!("{}: a time series is written as .csv or .svg", output.display()))),
+        _ => Err(Error::path(output, "a time series is written as .csv or .svg")),
     }
 }
 
@@ -141,11 +141,11 @@ impl AllSeries {
 
 fn probed_file(session: &Session, request: &PictureRequest) -> Result<CoefficientFile> {
     if session.coefficient_path(SplatSource::Coefficients).is_none() {
-        return Err(Error::usage("--probe: takes one coefficient file"));
+        return Err(Error::setting("probe", "takes one coefficient file"));
     }
     let file = session.file(request.skip_damaged)?;
     if file.channels() > 1 {
-        return Err(Error::usage("--probe: the file holds colours, which have no single value"));
+        return Err(Error::setting("probe", "the file holds colours, which have no single value"));
     }
     Ok(file)
 }
@@ -156,13 +156,13 @@ fn all_probes(request: &PictureRequest, file: &CoefficientFile, axes: &Axes) -> 
     let point = |point: &PointSpec| {
         let mut at = [0.0; 3];
         for (axis, position) in point.0.iter().enumerate() {
-            at[axis] = axes.voxel("--probe", axis, position)?;
+            at[axis] = axes.voxel("probe", axis, position)?;
         }
         let name: Vec<String> = (0..3).map(|axis| axes.text(axis, at[axis]).replace('@', "")).collect();
         Ok((name.join(" "), Probe::Point(Taps::new(at, &whole))))
     };
     let region = |spec: &RegionSpec| {
-        let region = spec.resolve(&file.grid).map_err(|e| renamed(&e))?;
+        let region = spec.resolve(&file.grid).map_err(renamed)?;
         Ok((spec.to_string(), Probe::Region(region)))
     };
     request.probe.iter().map(point).chain(request.probe_region.iter().map(region)).collect()
@@ -211,9 +211,12 @@ fn series_of_sums(name: &str, probe: &Probe, sums: &[Sum]) -> Vec<Series> {
     }
 }
 
-/// The error of a region, by the name of the option that gave it.
-fn renamed(error: &Error) -> Error {
-    Error::usage(error.to_string().replace("--region", "--probe-region"))
+/// The error of a region, by the name of the field that gave it.
+fn renamed(error: Error) -> Error {
+    match error {
+        Error::Setting { setting: "region", problem, .. } => Error::setting("probe_region", problem),
+        other => other,
+    }
 }
 
 /// The samples of a frame, summed up.

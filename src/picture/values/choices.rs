@@ -22,20 +22,20 @@ pub enum ModeName {
 
 impl Choice for ModeName {
     const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
-        ("projection", Self::Projection, "Average or sum the samples: see --quantity, --colormap"),
+        ("projection", Self::Projection, "Average or sum the samples: see `quantity`, `colormap`"),
         (
             "composite",
             Self::Composite,
-            "Colour the samples; near ones hide far ones: see --transfer-function, --opacity",
+            "Colour the samples; near ones hide far ones: see `transfer_function`, `opacity`",
         ),
-        ("mip", Self::Mip, "Show the largest value: see --colormap"),
-        ("iso", Self::Iso, "Show surfaces of equal value: see --iso, --light"),
-        ("slice", Self::Slice, "Show the samples on planes through the volume: see --slice, --colormap"),
+        ("mip", Self::Mip, "Show the largest value: see `colormap`"),
+        ("iso", Self::Iso, "Show surfaces of equal value: see `iso`, `light`"),
+        ("slice", Self::Slice, "Show the samples on planes through the volume: see `slice`, `colormap`"),
     ];
 }
 
 impl ModeName {
-    /// Whether samples along the ray have colours. In the other modes pixels have values, for --colormap.
+    /// Whether samples along the ray have colours. In the other modes pixels have values, for `colormap`.
     pub(crate) fn colours_samples(self) -> bool {
         match self {
             Self::Composite | Self::Iso => true,

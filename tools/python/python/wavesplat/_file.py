@@ -18,7 +18,7 @@ from . import _wavesplat
 from ._description import Axes, coordinates
 from ._figure import Figure
 from ._index import read_into, select
-from ._options import in_python, request
+from ._options import request
 from ._progress import Progress, reporting
 
 MEMORY = 512 << 20
@@ -337,7 +337,7 @@ class File:
     def _render(self, output: str, options: dict[str, Any], progress: Progress) -> None:
         options = {"lod": self._lod or None, **options}
         memory = str(options.pop("memory", MEMORY))
-        with reporting(progress, "render") as report, in_python():
+        with reporting(progress, "render") as report:
             self._file.render(request(options), output, memory, report)
 
     def view(self, *, browser: bool = True, port: int = 0, memory: int = MEMORY, **options: Any) -> Viewer:
@@ -352,8 +352,7 @@ class File:
         """
         if not 0 <= port < 1 << 16:
             raise ValueError(f"port: takes 0 to 65535, not {port}")
-        with in_python():
-            return Viewer(self._file.view(request(options), port, str(memory)), browser=browser)
+        return Viewer(self._file.view(request(options), port, str(memory)), browser=browser)
 
 
 def pictures(options: dict[str, Any], make: Callable[[str], object]) -> npt.NDArray[Any]:
@@ -371,7 +370,7 @@ def run(options: dict[str, Any], output: str, inputs: Sequence[str], progress: P
     """Does what options of ``wavesplat-render`` ask for; errors have the names of Python."""
     options = dict(options)
     memory = str(options.pop("memory", MEMORY))
-    with reporting(progress, "render") as report, in_python():
+    with reporting(progress, "render") as report:
         _wavesplat.render(inputs, request(options), output, memory, report)
 
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -77,13 +74,3 @@ def colours(given: Any) -> str:
     shares = np.linspace(0.0, 1.0, STEPS)
     levels = np.round(np.asarray(given(shares))[:, :3] * 255).astype(int)
     return ",".join(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in levels)
-
-
-@contextmanager
-def in_python() -> Iterator[None]:
-    """Raises errors with options by their names in Python: ``--splat-error`` is ``splat_error``."""
-    try:
-        yield
-    except ValueError as error:
-        named = re.sub(r"--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), str(error))
-        raise ValueError(named) from None
