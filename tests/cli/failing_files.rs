@@ -50,7 +50,7 @@ fn frames_that_do_not_belong_together_give_code_3() {
 }
 
 #[test]
-fn nothing_replaces_what_is_read() {
+fn no_output_replaces_an_input() {
     let (work, archive) = (Work::with_file(""), Archive::smooth([9, 8, 7], 6));
     archive.write_frames(&work, "frames");
     let before = |name: &str| std::fs::read(work.path(name)).unwrap();
@@ -72,7 +72,7 @@ fn nothing_replaces_what_is_read() {
 }
 
 #[test]
-fn files_that_are_not_there_give_code_1() {
+fn missing_files_give_code_1() {
     let work = Work::with_file("");
     work.wavesplat("convert absent.npy -o out.wspl").fails(1, &["absent.npy", "No such file"]);
     work.wavesplat("convert a.npy absent.npy -o out.wspl").fails(1, &["absent.npy", "No such file"]);
@@ -115,7 +115,7 @@ fn a_full_disk_gives_code_1() {
 }
 
 #[test]
-fn missing_values_are_refused_with_their_place_or_kept() {
+fn missing_values_are_refused_with_their_position_or_kept() {
     let (work, mut archive) = (Work::new(), small());
     let at = |x: usize, y: usize, z: usize, t: usize| t * 2800 + (z * 14 + y) * 20 + x;
     archive.values[at(4, 5, 6, 33)] = f32::NAN;

@@ -1,4 +1,4 @@
-//! Pictures in parts: the sum of parts is the picture of all, and what is no part of it is refused.
+//! Partial sums of pictures: the sum of all parts is the picture, and parts of other pictures are refused.
 
 use super::{Archive, Run, Work, floats, read_npy};
 use serde_json::{Value, json};
@@ -51,7 +51,7 @@ fn converted(archive: &Archive, options: &str) -> Work {
 }
 
 #[test]
-fn a_part_of_everything_is_the_picture() {
+fn one_part_with_all_voxels_gives_the_picture() {
     for (archive, convert, options) in [
         (Archive::smooth([20, 14, 10], 16), "", "--view 30,30 --view 0,0"),
         (with_gaps(), "", "--view 17,-40 --roll 12 --tau 0.05"),
@@ -215,7 +215,7 @@ fn trees(work: &Work) {
 }
 
 #[test]
-fn what_is_no_part_of_the_same_pictures_is_refused() {
+fn parts_of_other_pictures_are_refused() {
     let work = converted(&with_gaps(), "");
     let part = |options: &str, name: &str| {
         let size = if options.contains("--size") { "" } else { "--size 32x24" };
@@ -322,7 +322,7 @@ fn forged(part: &[u8], forge: impl FnOnce(&mut Value)) -> Vec<u8> {
 }
 
 #[test]
-fn numbers_that_lie_are_refused() {
+fn false_numbers_in_a_part_are_refused() {
     let (work, [path, _]) = two();
     let whole = work.read("a.wpart");
     work.write("a.wpart", forged(&whole, |_| ()));
@@ -387,7 +387,7 @@ fn with_text(part: &[u8], text: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn what_a_part_left_out_as_damaged_is_said_of_its_sums() {
+fn sums_report_the_damage_that_a_part_left_out() {
     let work = Work::new();
     work.write("a.npy", Archive::smooth([20, 14, 10], 16).npy());
     work.wavesplat("convert a.npy -o a.wspl --window 8 --block 8").ok();

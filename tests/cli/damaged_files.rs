@@ -25,7 +25,7 @@ fn a_truncated_file_is_refused_by_every_command() {
 }
 
 #[test]
-fn one_flipped_bit_anywhere_is_found_and_its_place_named() {
+fn one_flipped_bit_anywhere_is_found_and_located() {
     let (work, file) = some_file();
     let step = file.len() / 40;
     for i in 0..41 {
@@ -49,7 +49,7 @@ fn longer_files_are_refused() {
 }
 
 #[test]
-fn a_damaged_block_stops_what_needs_it_and_leaves_no_output() {
+fn a_damaged_block_stops_commands_that_need_it_and_leaves_no_output() {
     let (work, file) = some_file();
     let mut bad = file.clone();
     bad[file.len() / 3] ^= 0x10; // in a block, because blocks make up most of the file

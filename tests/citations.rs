@@ -111,7 +111,7 @@ fn pages(text: &str) -> impl Iterator<Item = &str> {
 }
 
 #[test]
-fn every_work_that_is_cited_is_in_the_bibliography_and_the_other_way_round() {
+fn cited_works_and_the_bibliography_are_the_same() {
     let (works, mut used) = (works(), BTreeSet::new());
     for Prose { path, text } in prose() {
         for key in cited(&text).filter(|key| key.chars().all(char::is_alphanumeric)) {

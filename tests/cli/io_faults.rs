@@ -3,7 +3,7 @@
 //! the right bytes after resuming.
 #![cfg(target_os = "linux")]
 
-use super::job::Job;
+use super::disturbed_job::Job;
 use super::{Archive, Run, Work};
 use crate::common::report;
 use std::collections::BTreeSet;

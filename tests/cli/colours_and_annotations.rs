@@ -11,7 +11,7 @@ const MAPS: &str = r#"[
     {"Name": "Far", "ColorSpace": "Diverging", "RGBPoints": [100, 0, 0, 1, 101, 1, 0, 0]}]"#;
 
 #[test]
-fn a_files_own_values_are_its_range() {
+fn a_map_file_sets_the_range() {
     let work = Work::with_file("");
     work.write("maps.json", MAPS);
     work.write("map.csv", "# grey\nvalue,red,green,blue\n-1,0,0,0\n2,255,255,255\n");
@@ -71,7 +71,7 @@ fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
 }
 
 #[test]
-fn automatic_ranges_go_with_the_map_and_the_norm() {
+fn automatic_ranges_depend_on_the_map_and_the_norm() {
     let work = Work::with_file("");
     let range = |options: &str| {
         let json = work.render(&format!("a.wspl {SIZE} --frames 2 -o a.png --force --json {options}")).ok().json();
@@ -150,7 +150,7 @@ fn a_sheet_has_all_pictures_in_rows() {
 }
 
 #[test]
-fn one_frame_of_several_views_turns() {
+fn several_views_of_one_frame_make_a_turntable() {
     let work = Work::with_file("");
     let render = |options: &str| work.render(&format!("a.wspl {SIZE} --range 0,1 --frames 2 --orbit 3 {options}")).ok();
     render("-o view%v.npy");
@@ -169,7 +169,7 @@ fn one_frame_of_several_views_turns() {
 }
 
 #[test]
-fn parts_of_annotations_are_drawn_alone() {
+fn each_annotation_can_be_drawn_alone() {
     let work = Work::with_file("");
     let shown = |options: &str| {
         let common = "a.wspl --frames 2 --size 320x240 --scale 6 --clear=-1e9,1e9"; // nothing hides the box
@@ -194,7 +194,7 @@ fn parts_of_annotations_are_drawn_alone() {
 }
 
 #[test]
-fn annotations_keep_the_volume_free() {
+fn annotations_do_not_cover_the_volume() {
     let work = Work::with_file("");
     for view in ["iso", "top", "front", "30,30", "200,-40"] {
         let shown = |options: &str| {
@@ -258,7 +258,7 @@ fn long_titles_are_cut_with_a_note() {
 }
 
 #[test]
-fn the_words_beside_the_bar_are_chosen() {
+fn the_label_of_the_colour_bar_can_be_chosen() {
     let work = Work::with_file("");
     let shown = |options: &str| {
         decode_png(&work.render(&format!("a.wspl --frames 2 --size 320x240 --annotate -o - {options}")).ok().out)

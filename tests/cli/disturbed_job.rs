@@ -1,4 +1,4 @@
-//! A command that is disturbed, the permitted states of its files, and how to bring it to its end.
+//! A command that is disturbed: the permitted states of its files, and the command that completes it.
 
 use super::{Archive, Run, Work};
 use std::fs;

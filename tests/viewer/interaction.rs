@@ -1,8 +1,8 @@
-//! What hands do: drag, turn the wheel, press keys, slide, play.
+//! Dragging, the wheel, keys, sliders and playing.
 
 use super::browser::Browser;
 use super::converted;
-use super::served::Served;
+use super::running_viewer::Served;
 use crate::cli::Work;
 use serde_json::{Value, json};
 
@@ -62,7 +62,7 @@ fn the_camera_follows_the_pointer() {
 }
 
 #[test]
-fn time_and_colours_ask_nothing() {
+fn changing_time_and_colours_sends_no_request() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);
@@ -91,7 +91,7 @@ fn time_and_colours_ask_nothing() {
 }
 
 #[test]
-fn clicks_plot_series_and_slices_know_their_places() {
+fn clicks_plot_the_series_of_a_point_on_a_slice() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);

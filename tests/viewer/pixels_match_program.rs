@@ -2,7 +2,7 @@
 
 use super::browser::Browser;
 use super::converted;
-use super::served::Served;
+use super::running_viewer::Served;
 use crate::cli::Work;
 use crate::cli::render::decode_png;
 use serde_json::{Value, json};

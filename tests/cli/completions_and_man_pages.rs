@@ -18,7 +18,7 @@ fn both_programs_complete_their_options_in_shells() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn shells_take_the_completions() {
+fn shells_accept_the_completions() {
     let work = Work::new();
     let reply =
         "COMP_WORDS=(wavesplat convert --tol); COMP_CWORD=2; _wavesplat wavesplat --tol convert; echo ${COMPREPLY[@]}";

@@ -1,7 +1,7 @@
 //! System limits on the size of files and on memory.
 #![cfg(target_os = "linux")]
 
-use super::job::Job;
+use super::disturbed_job::Job;
 use super::{Archive, Run, Work};
 use crate::common::report;
 use std::io::{Read, Write};

@@ -159,7 +159,7 @@ fn large() -> Stored {
 }
 
 #[test]
-fn a_remote_file_is_asked_few_times() {
+fn a_remote_file_needs_few_requests() {
     let stored = large();
     let remote = Remote::of(stored.bytes());
     let file = CoefficientFile::from_storage("https://example.org/a.wspl", remote.clone()).unwrap();

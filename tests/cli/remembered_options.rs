@@ -1,4 +1,4 @@
-//! How frames are read is remembered: to convert them again, to append to them, to verify against them.
+//! A file remembers the options by which its frames were read, for converting again, appending and verifying.
 
 use super::{Archive, Work, small};
 
@@ -16,7 +16,7 @@ pub(super) fn part(archive: &Archive, first: usize, end: usize) -> Archive {
     Archive { frames: end - first, values: archive.values[first * voxels..end * voxels].to_vec(), ..archive.clone() }
 }
 
-/// The options by which a file says that it is made again.
+/// The options that a file remembers.
 fn options_of(work: &Work, file: &str) -> String {
     let info = work.wavesplat(&format!("info {file} --json")).ok().json();
     let options = info["options"].as_object().unwrap();
@@ -24,7 +24,7 @@ fn options_of(work: &Work, file: &str) -> String {
 }
 
 #[test]
-fn a_file_is_made_again_by_the_options_that_it_names() {
+fn remembered_options_reproduce_the_file() {
     let work = Work::new();
     work.write("a.raw", headerless(&small()));
     let axes = format!("{}/tests/golden/inputs/hdf5/axes_xyzt.h5", env!("CARGO_MANIFEST_DIR"));
@@ -44,7 +44,7 @@ fn a_file_is_made_again_by_the_options_that_it_names() {
 }
 
 #[test]
-fn frames_are_appended_and_compared_as_the_first_were_read() {
+fn append_and_verify_read_frames_with_the_remembered_options() {
     let (work, all) = (Work::new(), small());
     let parts = [part(&all, 0, 32), part(&all, 32, 37), part(&all, 37, 40)];
     for (name, part) in ["a", "b", "c"].iter().zip(&parts) {
@@ -68,7 +68,7 @@ fn frames_are_appended_and_compared_as_the_first_were_read() {
 }
 
 #[test]
-fn options_that_are_given_go_before_those_that_are_remembered() {
+fn given_options_override_remembered_ones() {
     let (work, all) = (Work::new(), small());
     work.write("a.raw", headerless(&all));
     work.write("plain.raw", all.bytes());

@@ -12,7 +12,7 @@ fn singles(work: &Work, name: &str) -> (String, Vec<f32>) {
 const SIZE: &str = "--size 48x40";
 
 #[test]
-fn a_composite_is_light_and_opacity_in_an_array_and_colours_in_a_picture() {
+fn a_composite_array_holds_light_and_opacity_and_a_picture_holds_colours() {
     let work = Work::with_file("--tolerance 1e-4");
     let shown = "a.wspl --mode composite --transfer-function turbo --frames 2";
     work.render(&format!("{shown} {SIZE} -o light.npy")).ok();
@@ -164,7 +164,7 @@ fn empty_space_shows_the_background() {
 }
 
 #[test]
-fn suggested_opacities_show_what_is_rare() {
+fn suggested_opacities_show_rare_values() {
     let work = Work::new();
     nearly_empty(&work);
     let shown = |more: &str| {

@@ -1,4 +1,4 @@
-//! Warnings of conversions, and values that are refused since they probably mean "missing".
+//! Warnings of conversions, and input that is refused because a value probably means "missing".
 
 use super::{Archive, Run, Work, floats, npy, read_npy, small};
 
@@ -14,7 +14,7 @@ fn warnings(run: &Run) -> String {
 }
 
 #[test]
-fn a_fill_value_that_swallows_the_samples_is_refused() {
+fn a_fill_value_far_beyond_the_samples_is_refused() {
     let work = Work::new();
     for (fill, text) in [(1e20, "1e20"), (9.969_21e36, "9.96921e36"), (-9999.0, "-9999"), (-32768.0, "-32768")] {
         work.write("a.npy", changed(|x, v| if x < 4 { fill } else { v }).npy());
@@ -129,7 +129,7 @@ fn longer_windows_are_suggested_where_they_help() {
 }
 
 #[test]
-fn samples_that_come_back_negative_are_warned_of_and_clipped() {
+fn negative_decoded_samples_are_warned_of_and_clipped() {
     let work = Work::new();
     let archive = changed(|_, v| (v - 0.5).max(0.0));
     let (least, most) = archive.values.iter().fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(*v), hi.max(*v)));

@@ -1,4 +1,4 @@
-//! A scene that the library does not know renders as its samples do.
+//! A scene that another program implements renders as its samples do.
 
 use crate::common::formula::FormulaScene;
 use crate::common::pictures;

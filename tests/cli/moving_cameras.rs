@@ -89,7 +89,7 @@ fn movies_run_as_fast_as_asked() {
 }
 
 #[test]
-fn sheets_of_several_views_say_the_angles() {
+fn sheets_of_several_views_state_the_angles() {
     let work = Work::with_file("");
     let sheet = |options: &str| {
         work.render(&format!("a.wspl --size 200x160 --range 0,3 --frames 2 {options} -o s.png --format sheet")).ok();

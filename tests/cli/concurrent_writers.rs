@@ -1,6 +1,6 @@
 //! Several processes that write the same file at once: one succeeds, the others name the process that holds it.
 
-use super::job::{FILE, Job};
+use super::disturbed_job::{FILE, Job};
 use super::{Archive, Run};
 use crate::common::{report, times};
 use std::time::Instant;
@@ -49,7 +49,7 @@ fn many_replacements_of_one_file_each_leave_a_complete_one() {
 }
 
 #[test]
-fn an_append_and_a_conversion_at_once_leave_what_one_of_them_makes() {
+fn an_append_and_a_conversion_at_once_leave_the_result_of_one() {
     let archive = Archive::smooth([24, 20, 16], 24);
     let append = Job::append(&archive, 8, "--window 4 --threads 1");
     let work = &append.work;

@@ -1,4 +1,4 @@
-//! Archives come back as they were in everything but the samples' error, as the field's own software sees them.
+//! Extracted archives have the metadata of their sources, as xarray, nibabel, ITK and VTK read them.
 
 use super::{CONVERT, Work};
 use crate::common::report;
@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 #[test]
-fn archives_come_back_as_they_were() {
+fn archives_come_back_with_all_their_metadata() {
     let Ok(python) = std::env::var("WAVESPLAT_PYTHON") else {
         report("not run: WAVESPLAT_PYTHON names no Python with what tools/python/fixtures.txt lists");
         return;

@@ -31,7 +31,7 @@ fn each_variable_becomes_a_file() {
 }
 
 #[test]
-fn the_length_of_a_vector_is_that_of_its_components() {
+fn a_magnitude_is_computed_from_its_components() {
     let (work, source) = (Work::new(), input("vti/vector.vti"));
     let component = |name: &str| {
         work.wavesplat(&format!("convert {source} -o {name}.wspl --variable velocity[{name}] --tolerance 0")).ok();

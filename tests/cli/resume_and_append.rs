@@ -47,7 +47,7 @@ fn appending_whole_windows_equals_a_single_conversion() {
 }
 
 #[test]
-fn a_short_last_window_stays_and_the_next_frames_begin_one() {
+fn a_short_last_window_stays_and_appended_frames_begin_a_new_one() {
     let (work, archive) = work();
     work.write("few.npy", some_frames(&archive, 0..13));
     work.write("more.npy", some_frames(&archive, 13..40));

@@ -119,7 +119,7 @@ fn views_of_one_run_are_of_one_size() {
 }
 
 #[test]
-fn views_in_pairs_with_frames_show_these_alone() {
+fn paired_views_show_only_their_own_frame() {
     let samples = field(&GRID, FRAMES, 7);
     let mut memory = archive(GRID, SampleType::F32, &samples);
     let file = stored(&mut memory, &ConvertConfig { block: Some(16), ..settings(Basis::Haar, 8, 0.02) });

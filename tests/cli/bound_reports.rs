@@ -26,7 +26,7 @@ fn number(value: &serde_json::Value) -> f64 {
 }
 
 #[test]
-fn every_bound_is_promised_reached_and_verified() {
+fn every_bound_is_reported_kept_and_verified() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     for (name, options) in MODES {

@@ -1,7 +1,7 @@
 //! Requests that no page of the viewer sends, and clients that are slow or gone.
 
 use super::converted;
-use super::served::Served;
+use super::running_viewer::Served;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::time::{Duration, Instant};
@@ -26,7 +26,7 @@ fn with(changes: &Value) -> Vec<u8> {
 }
 
 #[test]
-fn only_who_knows_the_address_and_is_its_page_gets_answers() {
+fn only_the_page_at_the_secret_address_gets_answers() {
     let work = converted("");
     let served = Served::start(&work, "a.wspl");
     let (host, path) = (served.host().to_string(), served.path(""));
@@ -101,7 +101,7 @@ fn wrong_requests_get_their_reason_and_no_picture() {
 }
 
 #[test]
-fn slow_and_vanishing_clients_stop_nobody() {
+fn slow_and_vanishing_clients_block_no_other_client() {
     let work = converted("");
     let served = Served::start(&work, "a.wspl");
     let (host, path) = (served.host().to_string(), served.path("pictures"));

@@ -1,4 +1,4 @@
-//! The programs' messages for input that they do not understand, and their descriptions of themselves.
+//! Messages about missing, misspelt and misplaced arguments say what to do next.
 
 use super::{CONVERT, RENDER, Work, small};
 
@@ -38,7 +38,7 @@ fn options_of_another_command_are_named_as_such() {
 }
 
 #[test]
-fn a_word_that_is_no_command_is_understood_as_far_as_it_can_be() {
+fn an_unknown_command_is_answered_with_a_similar_one_or_the_right_command() {
     let work = Work::with_file("");
     work.wavesplat("conver a.npy").fails(2, &["conver", "similar", "'convert'"]);
     work.wavesplat("a.wspl").fails(2, &["wavesplat info a.wspl", "wavesplat-render a.wspl"]);

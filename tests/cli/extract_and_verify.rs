@@ -170,7 +170,7 @@ fn a_coarse_lattice_is_every_few_voxels() {
 }
 
 #[test]
-fn coefficient_files_are_packed_anew() {
+fn coefficient_files_are_repacked() {
     let work = Work::with_file("");
     let golden = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/samples-u16.wspl");
     work.write("old.wspl", std::fs::read(golden).unwrap());
