@@ -29,7 +29,7 @@ impl Axes {
     }
 
     /// The axes of a coefficient file.
-    pub(crate) fn of_file(file: &CoefficientFile) -> Result<Self> {
+    pub(crate) fn from_file(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
         let grid = Grid { dims: m.dims.map(|n| n as usize), spacing: m.spacing, origin: m.origin };
         Ok(Self::new(&grid, file.description()?.as_ref()))

@@ -9,7 +9,7 @@ use crate::file::CoefficientFile;
 use crate::formats;
 use crate::remote::RemoteOptions;
 use crate::render::SplatSource;
-use crate::render::parts::is_part;
+use crate::render::partial::is_partial;
 use crate::source::{FrameSource, OpenOptions};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -130,7 +130,7 @@ fn kept(
 
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
-    if is_part(path) {
+    if is_partial(path) {
         return Error::usage(format!("{}: is a part of a picture; --sum makes pictures of parts", path.display()));
     }
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });

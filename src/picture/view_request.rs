@@ -148,7 +148,7 @@ impl ViewRequest {
             ViewMode::Slice => request.mode = Some(ModeName::Slice),
         }
         if matches!(mode, ViewMode::Slice | ViewMode::Composite) {
-            request.slice = self.slices.iter().map(slice).collect();
+            request.slice = self.slices.iter().map(|(axis, share)| slice(*axis, *share)).collect();
         }
         if let Some(map) = &self.map {
             let colours = if colours_samples { &mut request.transfer_function } else { &mut request.colormap };
@@ -188,8 +188,8 @@ impl ViewRequest {
 }
 
 /// A slice at a share of an axis.
-fn slice((axis, share): &(Axis, f64)) -> SliceSpec {
-    SliceSpec { axis: axis.name().into(), position: AxisPosition::Share(*share) }
+fn slice(axis: Axis, share: f64) -> SliceSpec {
+    SliceSpec { axis: axis.name().into(), position: AxisPosition::Share(share) }
 }
 
 fn clear_spec(clear: &[f64]) -> ClearSpec {

@@ -4,7 +4,7 @@ use super::{Archive, Run, Work, floats, read_npy};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use wavesplat::base::progress::Silent;
-use wavesplat::render::parts::Total;
+use wavesplat::render::partial::PartialTotal;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Regions that are no whole blocks, without overlap; together they are all voxels of 20 x 14 x 10.
@@ -271,7 +271,7 @@ fn parts_of_other_pictures_are_refused() {
 
 /// Adds parts and makes all their pictures.
 fn made(paths: &[PathBuf]) -> wavesplat::Result<()> {
-    let total = Total::open(paths, 64 << 20, &Silent)?;
+    let total = PartialTotal::open(paths, 64 << 20, &Silent)?;
     total.render(&total.frames(), &Silent, &mut |_| Ok(())).map(drop)
 }
 

@@ -49,9 +49,9 @@ impl Planes {
         Self { size, numbers, log, planes: Vec::new() }
     }
 
-    /// Adds a picture. The numbers of a pixel are side by side in it.
-    pub(crate) fn push(&mut self, picture: &[f32], of: impl Fn(f32) -> f32) {
-        let plane = |n| picture.iter().skip(n).step_by(self.numbers).map(|value| of(*value)).collect();
+    /// Adds a picture. The numbers of a pixel are side by side in it; `number` gives what is kept of each.
+    pub(crate) fn push(&mut self, picture: &[f32], number: impl Fn(f32) -> f32) {
+        let plane = |n| picture.iter().skip(n).step_by(self.numbers).map(|value| number(*value)).collect();
         let planes: Vec<Vec<f32>> = (0..self.numbers).map(plane).collect();
         self.planes.extend(planes);
     }
@@ -111,11 +111,11 @@ impl Planes {
     /// Whether each number of a pixel is known in some picture.
     fn is_known(&self) -> Vec<Vec<bool>> {
         let pixels = self.size[0] * self.size[1];
-        let of_number = |n: usize| {
+        let is_known = |n: usize| {
             let planes = || self.planes.iter().skip(n).step_by(self.numbers);
             (0..pixels).map(|at| planes().any(|plane| !plane[at].is_nan())).collect()
         };
-        (0..self.numbers).map(of_number).collect()
+        (0..self.numbers).map(is_known).collect()
     }
 
     /// Gives missing numbers the last number of their pixel, else its next one, else 0: these change least over time.

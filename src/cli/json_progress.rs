@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 /// Writes JSON objects to standard error, one per line: up to two a second, and one at the end of the stage.
 #[derive(Debug)]
-pub struct Lines {
+pub struct JsonProgress {
     stage: &'static str,
     unit: &'static str,
     state: Mutex<State>,
@@ -38,7 +38,7 @@ struct Line {
 
 const BETWEEN_LINES: Duration = Duration::from_millis(500);
 
-impl Lines {
+impl JsonProgress {
     pub(super) fn new(stage: &'static str, unit: &'static str) -> Self {
         let state = State { total: None, done: 0, before: 0, started: None, written: None };
         Self { stage, unit, state: Mutex::new(state) }
@@ -89,7 +89,7 @@ impl Lines {
     }
 }
 
-impl Drop for Lines {
+impl Drop for JsonProgress {
     fn drop(&mut self) {
         self.write_last();
     }

@@ -1,4 +1,4 @@
-//! The head of a part: its settings, its sources, and where its records lie.
+//! The head of a partial sum: its settings, its sources, and where its records lie.
 
 use crate::base::grid::{BlockGrid, Grid, Region};
 use crate::base::time_labels::TimeLabels;
@@ -19,10 +19,10 @@ pub(super) const MOST_BOXES: usize = 1 << 14;
 /// The most views.
 const MOST_VIEWS: usize = 1 << 16;
 
-/// The settings that all parts of a picture share.
+/// The settings that all partial sums of a picture share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Look {
+pub struct PictureSetup {
     /// Identifies the archive, whole or in shards.
     pub archive: String,
     /// Frames of the archive.
@@ -65,10 +65,10 @@ pub struct Look {
     pub calendar: Option<String>,
 }
 
-/// A coefficient file that a part was made of.
+/// A coefficient file that a partial sum was made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Source {
+pub struct PartialSource {
     /// Its id.
     pub file: String,
     /// The first of its frames, and the end (exclusive), as the archive numbers them.
@@ -77,7 +77,7 @@ pub struct Source {
     pub times: Vec<f64>,
 }
 
-/// The head of a part.
+/// The head of a partial sum.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Head {
@@ -85,12 +85,12 @@ pub struct Head {
     pub(super) schema: u32,
     /// Name and version of the program.
     pub software: String,
-    /// What all parts share.
-    pub look: Look,
-    /// The voxels of the part: boxes of the lattice that is drawn, without overlap.
+    /// What all partial sums of a picture share.
+    pub look: PictureSetup,
+    /// The voxels of the sum: boxes of the lattice that is drawn, without overlap.
     pub boxes: Vec<Region>,
     /// The files that it was made of.
-    pub sources: Vec<Source>,
+    pub sources: Vec<PartialSource>,
     /// Error bound of every splatted sample.
     pub sample_error: f64,
     /// What was left out as damaged, if anything was.
@@ -106,7 +106,7 @@ pub struct Head {
 #[serde(deny_unknown_fields)]
 pub(super) struct WeightRecord {
     pub(super) view: usize,
-    pub(super) place: Place,
+    pub(super) place: RecordSpan,
 }
 
 /// Where the sums of a picture lie.
@@ -117,19 +117,19 @@ pub(super) struct PictureRecord {
     pub(super) frame: usize,
     /// Whether it has planes of missing weights.
     pub(super) missing: bool,
-    pub(super) place: Place,
+    pub(super) place: RecordSpan,
 }
 
-/// A packed record.
+/// Where a packed record lies, with its checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Place {
+pub(super) struct RecordSpan {
     pub(super) offset: u64,
     pub(super) bytes: u64,
     pub(super) checksum: u64,
 }
 
-impl Look {
+impl PictureSetup {
     /// Pixels of a picture.
     pub(super) fn pixels(&self) -> usize {
         self.views[0].size[0] * self.views[0].size[1]
@@ -164,12 +164,12 @@ impl Look {
         }
     }
 
-    /// The first setting that differs from another look.
+    /// The first setting in which another setup differs.
     pub(super) fn difference(&self, other: &Self) -> Option<String> {
         if self == other {
             return None;
         }
-        let object = |look: &Self| serde_json::to_value(look).ok().and_then(|value| value.as_object().cloned());
+        let object = |setup: &Self| serde_json::to_value(setup).ok().and_then(|value| value.as_object().cloned());
         let (own, other) = (object(self)?, object(other)?);
         let named = |key: &String| match key.as_str() {
             "archive" | "frames" | "channels" | "block" | "values" | "axes" | "time_unit" | "calendar" => {
@@ -201,8 +201,8 @@ impl Look {
         ensure(pixels.is_some() && self.views.iter().all(|view| view.size == size), "has no sound size of pictures")?;
         ensure(matches!(self.channels, 1 | 3), "has neither values nor colours")?;
         ensure(self.lod < 32 && self.exaggeration.is_finite() && self.exaggeration > 0.0, "has no sound lattice")?;
-        let of_views = |frames: &Vec<usize>| frames.len() == self.views.len() && frames.is_sorted();
-        ensure(self.paired.as_ref().is_none_or(of_views), "has no frame for each view")?;
+        let one_per_view = |frames: &Vec<usize>| frames.len() == self.views.len() && frames.is_sorted();
+        ensure(self.paired.as_ref().is_none_or(one_per_view), "has no frame for each view")?;
         let all: Vec<usize> = (0..self.views.len()).collect();
         let config = self.config(&all, self.paired.clone().unwrap_or_default(), 0);
         let kernel = Kernel::new(Some(self.kernel.sigma), self.kernel.tau, &self.grid).map(drop);
@@ -218,34 +218,42 @@ impl Head {
     /// An error unless all numbers are sound. Records end before `end`.
     pub(super) fn check(&self, end: u64) -> Result<(), String> {
         self.look.check()?;
-        let within = |of: &Region| self.look.grid.whole().contains(of) && (0..3).all(|a| of.start[a] < of.end[a]);
+        let lattice = self.look.grid.whole();
+        let within = |voxels: &Region| lattice.contains(voxels) && (0..3).all(|a| voxels.start[a] < voxels.end[a]);
         ensure(
             (1..=MOST_BOXES).contains(&self.boxes.len()) && self.boxes.iter().all(within),
             "has voxels beyond its lattice",
         )?;
-        let source = |of: &Source| {
-            let [first, behind] = of.frames;
-            let times = of.times.is_empty() || of.times.len() == behind - first.min(behind);
-            first < behind && behind <= self.look.frames && times && of.times.iter().all(|time| time.is_finite())
+        let sound = |source: &PartialSource| {
+            let ([first, behind], times) = (source.frames, &source.times);
+            let one_per_frame = times.is_empty() || times.len() == behind - first.min(behind);
+            first < behind && behind <= self.look.frames && one_per_frame && times.iter().all(|time| time.is_finite())
         };
-        ensure(!self.sources.is_empty() && self.sources.iter().all(source), "has frames beyond its archive")?;
-        let held = |frame: usize| self.sources.iter().any(|of| (of.frames[0]..of.frames[1]).contains(&frame));
-        let paired = |of: &PictureRecord| self.look.paired.as_ref().is_none_or(|frames| frames[of.view] == of.frame);
-        let picture = |of: &PictureRecord| of.view < self.look.views.len() && held(of.frame) && paired(of);
-        ensure(self.pictures.iter().all(picture), "has pictures of no view or frame of its own")?;
-        ensure(self.weights.iter().all(|of| of.view < self.look.views.len()), "has weights of no view of its own")?;
-        let placed = |place: &Place| place.offset.checked_add(place.bytes).is_some_and(|behind| behind <= end);
-        let places = self.weights.iter().map(|of| &of.place).chain(self.pictures.iter().map(|of| &of.place));
-        ensure(places.into_iter().all(placed), "has records beyond its end")?;
+        ensure(!self.sources.is_empty() && self.sources.iter().all(sound), "has frames beyond its archive")?;
+        let held =
+            |frame: usize| self.sources.iter().any(|source| (source.frames[0]..source.frames[1]).contains(&frame));
+        let paired =
+            |record: &PictureRecord| self.look.paired.as_ref().is_none_or(|frames| frames[record.view] == record.frame);
+        let sound =
+            |record: &PictureRecord| record.view < self.look.views.len() && held(record.frame) && paired(record);
+        ensure(self.pictures.iter().all(sound), "has pictures of no view or frame of its own")?;
+        ensure(
+            self.weights.iter().all(|record| record.view < self.look.views.len()),
+            "has weights of no view of its own",
+        )?;
+        let before_end = |span: &RecordSpan| span.offset.checked_add(span.bytes).is_some_and(|behind| behind <= end);
+        let weights = self.weights.iter().map(|record| &record.place);
+        let mut spans = weights.chain(self.pictures.iter().map(|record| &record.place));
+        ensure(spans.all(before_end), "has records beyond its end")?;
         ensure(self.sample_error >= 0.0, "has no sound error")
     }
 
     /// The labels of all frames of the archive. Frames that no source holds get the time of the last frame before them
     /// that a source holds, or of the first one.
-    pub(super) fn time_labels(look: &Look, sources: &[Source]) -> TimeLabels {
-        let mut times: Vec<Option<f64>> = vec![None; sources.iter().map(|of| of.frames[1]).max().unwrap_or(0)];
-        for of in sources {
-            times[of.frames[0]..of.frames[1]].iter_mut().zip(&of.times).for_each(|(to, time)| *to = Some(*time));
+    pub(super) fn time_labels(setup: &PictureSetup, sources: &[PartialSource]) -> TimeLabels {
+        let mut times: Vec<Option<f64>> = vec![None; sources.iter().map(|source| source.frames[1]).max().unwrap_or(0)];
+        for PartialSource { frames: [first, behind], times: own, .. } in sources {
+            times[*first..*behind].iter_mut().zip(own).for_each(|(to, time)| *to = Some(*time));
         }
         let mut last = times.iter().copied().flatten().next();
         let fill = |time: Option<f64>| {
@@ -253,7 +261,7 @@ impl Head {
             last
         };
         let known: Option<Vec<f64>> = times.into_iter().map(fill).collect();
-        TimeLabels::new(known.unwrap_or_default(), Some(&look.time_unit), look.calendar.as_deref())
+        TimeLabels::new(known.unwrap_or_default(), Some(&setup.time_unit), setup.calendar.as_deref())
     }
 }
 

@@ -1,6 +1,6 @@
-//! Reads a part. Every number is checked before memory is taken for what it counts.
+//! Reads partial sums. Every number is checked before memory is taken for what it counts.
 
-use super::look::{Head, PictureRecord, Place, SCHEMA};
+use super::head::{Head, PictureRecord, RecordSpan, SCHEMA};
 use super::{END, MAGIC};
 use crate::base::address::refuse_address;
 use crate::base::error::{Error, Result};
@@ -16,9 +16,9 @@ const MOST_HEAD: u64 = 256 << 20;
 /// Memory of a head in units of its bytes, about.
 const HEAD_SHARE: u64 = 4;
 
-/// A part of a picture.
+/// A file of partial sums.
 #[derive(Debug)]
-pub struct PartFile {
+pub struct PartialFile {
     path: PathBuf,
     /// Its settings, sources and records.
     pub head: Head,
@@ -26,18 +26,18 @@ pub struct PartFile {
     pub(super) head_bytes: usize,
 }
 
-/// Whether a file begins as a part.
-pub fn is_part(path: &Path) -> bool {
+/// Whether a file begins as one of partial sums.
+pub fn is_partial(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     let is_file = std::fs::metadata(path).is_ok_and(|file| file.is_file());
     is_file && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
 }
 
-impl PartFile {
-    /// Opens a part, and reads its head within `memory` bytes.
+impl PartialFile {
+    /// Opens a file, and reads its head within `memory` bytes.
     ///
     /// # Errors
-    /// A file that cannot be read, is not a part, is damaged, or contradicts itself.
+    /// A file that cannot be read, holds no partial sums, is damaged, or contradicts itself.
     pub fn open(path: &Path, memory: usize) -> Result<Self> {
         refuse_address(path)?;
         let doing = |e| Error::io(path, "reading", e);
@@ -46,7 +46,7 @@ impl PartFile {
             return Err(Error::path(path, "is no file: parts are read from their end"));
         }
         let length = length.len();
-        if !is_part(path) || length < (MAGIC.len() + END) as u64 {
+        if !is_partial(path) || length < (MAGIC.len() + END) as u64 {
             return Err(Error::input(path, "is no part of a picture, or has lost its beginning"));
         }
         let end = read_at(path, length - END as u64, END)?;
@@ -58,7 +58,7 @@ impl PartFile {
         if bytes > MOST_HEAD || packed > MOST_HEAD || (bytes + packed).saturating_mul(HEAD_SHARE) > memory as u64 {
             return Err(Error::input(path, format!("its head of {bytes} bytes does not fit in memory")));
         }
-        let json = unpacked(path, Place { offset, bytes: packed, checksum }, bytes as usize)?;
+        let json = unpacked(path, RecordSpan { offset, bytes: packed, checksum }, bytes as usize)?;
         let version = |v: &serde_json::Value| v.get("schema").and_then(serde_json::Value::as_u64);
         let head = serde_json::from_slice::<Head>(&json).map_err(|e| {
             let newer = serde_json::from_slice(&json).ok().as_ref().and_then(version);
@@ -82,21 +82,21 @@ impl PartFile {
 
     /// Adds the weights of a view to sums.
     pub(super) fn add_weights(&self, view: usize, sums: &mut [f64]) -> Result<()> {
-        let record = self.head.weights.iter().find(|of| of.view == view);
+        let record = self.head.weights.iter().find(|record| record.view == view);
         let record = record.ok_or_else(|| damaged(&self.path, &format!("it has no weights of view {view}")))?;
         self.add(record.place, 1, &mut [sums])
     }
 
     /// Adds the sums of a picture to planes in the order of a record. `missing` says whether these have missing weights.
-    pub(super) fn add_picture(&self, record: &PictureRecord, (planes, missing): (&mut [Vec<f64>], bool)) -> Result<()> {
+    pub(super) fn add_picture(&self, record: &PictureRecord, planes: &mut [Vec<f64>], missing: bool) -> Result<()> {
         let step = if missing && !record.missing { 2 } else { 1 };
         let mut own: Vec<&mut [f64]> = planes.iter_mut().step_by(step).map(Vec::as_mut_slice).collect();
         self.add(record.place, self.head.look.planes(record.missing), &mut own)
     }
 
-    fn add(&self, place: Place, planes: usize, sums: &mut [&mut [f64]]) -> Result<()> {
+    fn add(&self, span: RecordSpan, planes: usize, sums: &mut [&mut [f64]]) -> Result<()> {
         let pixels = self.head.look.pixels();
-        let bytes = unpacked(&self.path, place, planes * pixels * size_of::<f64>())?;
+        let bytes = unpacked(&self.path, span, planes * pixels * size_of::<f64>())?;
         for (plane, sums) in bytes.chunks_exact(pixels * size_of::<f64>()).zip(sums) {
             let numbers = plane.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes));
             sums.iter_mut().zip(numbers).for_each(|(sum, number)| *sum += number);
@@ -106,8 +106,8 @@ impl PartFile {
 }
 
 /// The bytes of a record.
-fn unpacked(path: &Path, place: Place, bytes: usize) -> Result<Vec<u8>> {
-    let Place { offset, bytes: packed, checksum } = place;
+fn unpacked(path: &Path, span: RecordSpan, bytes: usize) -> Result<Vec<u8>> {
+    let RecordSpan { offset, bytes: packed, checksum } = span;
     if packed > zstd::zstd_safe::compress_bound(bytes) as u64 {
         return Err(damaged(path, &format!("the record at byte {offset} is longer than its numbers")));
     }

@@ -1,8 +1,8 @@
-//! Adds parts, and makes pictures of their sums.
+//! Adds partial sums, and makes pictures of the total.
 
-use super::look::{Head, Look, MOST_BOXES, PictureRecord, Source};
-use super::read::PartFile;
-use super::write::PartWriter;
+use super::head::{Head, MOST_BOXES, PartialSource, PictureRecord, PictureSetup};
+use super::read::PartialFile;
+use super::write::PartialWriter;
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::base::progress::Progress;
@@ -20,15 +20,15 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Parts and their records of one picture.
+/// The parts of one picture, and the numbers of their records.
 type Holders = Vec<(usize, usize)>;
 
-/// Parts that make up pictures.
+/// Partial sums that make up pictures.
 #[derive(Debug)]
-pub struct Total {
-    look: Look,
-    /// In the order of their voxels. Only `look` has the axes.
-    parts: Vec<PartFile>,
+pub struct PartialTotal {
+    setup: PictureSetup,
+    /// In the order of their voxels. Only `setup` has the axes.
+    parts: Vec<PartialFile>,
     /// For each view and frame, the parts that add to the picture, and the numbers of their records.
     pictures: BTreeMap<(usize, usize), Holders>,
     /// The voxels of every picture.
@@ -36,7 +36,7 @@ pub struct Total {
     memory: usize,
 }
 
-impl Total {
+impl PartialTotal {
     /// Opens parts in any order. Heads and sums take at most `memory` bytes.
     ///
     /// # Errors
@@ -44,14 +44,14 @@ impl Total {
     /// others have; each is named.
     pub fn open(paths: &[PathBuf], memory: usize, progress: &dyn Progress) -> Result<Self> {
         progress.start(Some(paths.len() as u64));
-        let (mut parts, mut look, mut left): (Vec<PartFile>, Option<Look>, _) = (Vec::new(), None, memory);
+        let (mut parts, mut setup, mut left): (Vec<PartialFile>, Option<PictureSetup>, _) = (Vec::new(), None, memory);
         for path in paths {
             progress.check()?;
-            let mut part = PartFile::open(path, left)?;
+            let mut part = PartialFile::open(path, left)?;
             left -= part.head_bytes;
-            match (&look, parts.first()) {
-                (Some(look), Some(first)) => check_alike((look, first.path()), &part)?,
-                _ => look = Some(part.head.look.clone()),
+            match (&setup, parts.first()) {
+                (Some(setup), Some(first)) => check_alike(setup, first.path(), &part)?,
+                _ => setup = Some(part.head.look.clone()),
             }
             part.head.look.axes = Default::default();
             parts.push(part);
@@ -63,18 +63,18 @@ impl Total {
         });
         check_sources(&parts)?;
         let pictures = pictures(&parts)?;
-        let (Some(first), Some(look)) = (pictures.values().next(), look) else {
+        let (Some(first), Some(setup)) = (pictures.values().next(), setup) else {
             return Err(Error::setting("inputs", "none of the parts has a picture"));
         };
-        let total = Self { look, boxes: boxes(&parts, first), pictures, parts, memory: left };
+        let total = Self { setup, boxes: boxes(&parts, first), pictures, parts, memory: left };
         total.check_voxels()?;
         total.check_frames()?;
         Ok(total)
     }
 
     /// The settings that all parts share.
-    pub fn look(&self) -> &Look {
-        &self.look
+    pub fn setup(&self) -> &PictureSetup {
+        &self.setup
     }
 
     /// The number of parts.
@@ -84,12 +84,12 @@ impl Total {
 
     /// The share of the lattice's voxels that the parts have, 0 to 1.
     pub fn covered(&self) -> f64 {
-        self.voxels() as f64 / self.look().grid.whole().voxels() as f64
+        self.voxels() as f64 / self.setup().grid.whole().voxels() as f64
     }
 
     /// Whether the parts have all voxels of the lattice.
     pub fn is_whole(&self) -> bool {
-        self.voxels() == self.look().grid.whole().voxels()
+        self.voxels() == self.setup().grid.whole().voxels()
     }
 
     /// The voxels of all boxes, which share none.
@@ -103,7 +103,7 @@ impl Total {
             start: std::array::from_fn(|axis| a.start[axis].min(b.start[axis])),
             end: std::array::from_fn(|axis| a.end[axis].max(b.end[axis])),
         };
-        self.boxes.iter().copied().reduce(join).unwrap_or(self.look().grid.whole())
+        self.boxes.iter().copied().reduce(join).unwrap_or(self.setup().grid.whole())
     }
 
     /// The frames that the parts have pictures of, ascending, each once.
@@ -115,21 +115,22 @@ impl Total {
     }
 
     /// The files that the parts were made of, in the order of their frames.
-    pub fn sources(&self) -> Vec<Source> {
-        let mut sources: Vec<Source> = self.parts.iter().flat_map(|part| part.head.sources.iter().cloned()).collect();
-        sources.sort_by_key(|of| of.frames);
+    pub fn sources(&self) -> Vec<PartialSource> {
+        let mut sources: Vec<PartialSource> =
+            self.parts.iter().flat_map(|part| part.head.sources.iter().cloned()).collect();
+        sources.sort_by_key(|source| source.frames);
         sources.dedup();
         sources
     }
 
     /// The times of frames.
     pub fn time_labels(&self) -> TimeLabels {
-        Head::time_labels(self.look(), &self.sources())
+        Head::time_labels(self.setup(), &self.sources())
     }
 
     /// What a part left out as damaged, if any did.
     pub fn damage(&self) -> Option<String> {
-        let damage = |part: &PartFile| Some(format!("{}: {}", part.path().display(), part.head.damage.as_ref()?));
+        let damage = |part: &PartialFile| Some(format!("{}: {}", part.path().display(), part.head.damage.as_ref()?));
         self.parts.iter().find_map(damage)
     }
 
@@ -156,15 +157,17 @@ impl Total {
             return Err(Error::setting("frames", format!("no part has a picture of frame {frame}")));
         }
         let views = self.views(frames);
-        let of_view = |view: &usize| self.look().paired.as_ref().map_or(0, |paired| paired[*view]);
-        let frames = if self.look().paired.is_some() { views.iter().map(of_view).collect() } else { frames.to_vec() };
-        Ok(self.look().config(&views, frames, memory))
+        let frames = match &self.setup().paired {
+            Some(paired) => views.iter().map(|view| paired[*view]).collect(),
+            None => frames.to_vec(),
+        };
+        Ok(self.setup().config(&views, frames, memory))
     }
 
     /// The least memory in bytes that sums take, without the memory of the sink.
     pub fn least_memory(&self) -> usize {
-        let buffers = 5 + 5 * self.look().planes(true); // weights; sums, a record as read and unpacked, and the picture
-        self.look().pixels().saturating_mul(buffers * size_of::<f64>())
+        let buffers = 5 + 5 * self.setup().planes(true); // weights; sums, a record as read and unpacked, and the picture
+        self.setup().pixels().saturating_mul(buffers * size_of::<f64>())
     }
 
     /// Makes the pictures of [`Self::config`] with these frames, and gives each to `sink`, view after view.
@@ -179,22 +182,22 @@ impl Total {
     ) -> Result<RenderReport> {
         let (started, config) = (Instant::now(), self.config(frames, self.memory)?);
         self.check_memory()?;
-        let projection = Projection::new(&self.look().grid, self.look().blocks(), &config)?;
+        let projection = Projection::new(&self.setup().grid, self.setup().blocks(), &config)?;
         let reports = projection.reports(&config);
         let steps = config.shown().len();
         progress.start(Some(steps as u64));
         for (n, (view, setup)) in self.views(frames).into_iter().zip(&projection.setups).enumerate() {
             let mut weights: Option<(Vec<usize>, WeightSums<'_>)> = None;
-            for (frame, holders) in self.of_view(view, frames) {
+            for (frame, holders) in self.pictures_of_view(view, frames) {
                 progress.check()?;
                 let parts: Vec<usize> = holders.iter().map(|(part, _)| *part).collect();
-                if weights.as_ref().is_none_or(|(of, _)| *of != parts) {
-                    let own = self.weights(setup, &config, (view, &parts))?;
+                if weights.as_ref().is_none_or(|(weighed, _)| *weighed != parts) {
+                    let own = self.weights(setup, &config, view, &parts)?;
                     weights = Some((parts, own));
                 }
                 let Some((_, weights)) = &weights else { continue };
                 let (planes, missing) = self.sums(holders)?;
-                let picture = picture(&config, weights, (&planes, missing));
+                let picture = picture(&config, weights, &planes, missing);
                 sink(Rendered { views: &reports, view: n, frame, picture: &picture, error: None })?;
                 progress.advance(1);
             }
@@ -208,15 +211,16 @@ impl Total {
         Ok(report)
     }
 
-    /// Writes the sums of these frames as one part, called `name` in messages.
+    /// Writes the total of these frames as one partial sum, called `name` in messages.
     ///
     /// # Errors
     /// Frames that no part has, too little memory, damaged parts, or failed writes.
-    pub fn join<W: Write>(&self, frames: &[usize], (name, out): (&Path, W), progress: &dyn Progress) -> Result<W> {
+    pub fn join<W: Write>(&self, frames: &[usize], name: &Path, out: W, progress: &dyn Progress) -> Result<W> {
         self.config(frames, self.memory)?;
         self.check_memory()?;
-        let mut writer = PartWriter::new((name, out), self.look().clone(), (self.boxes.clone(), self.sources()))?;
-        let all = self.views(frames).into_iter().map(|view| (view, self.of_view(view, frames).collect::<Vec<_>>()));
+        let mut writer = PartialWriter::new(name, out, self.setup().clone(), self.boxes.clone(), self.sources())?;
+        let all =
+            self.views(frames).into_iter().map(|view| (view, self.pictures_of_view(view, frames).collect::<Vec<_>>()));
         let all: Vec<_> = all.collect();
         progress.start(Some(all.iter().map(|(_, pictures)| pictures.len() as u64).sum()));
         for (view, pictures) in all {
@@ -235,25 +239,25 @@ impl Total {
     }
 
     /// The pictures of a view that show some of the frames.
-    fn of_view<'a>(&'a self, view: usize, frames: &'a [usize]) -> impl Iterator<Item = (usize, &'a Holders)> {
-        let of_view = self.pictures.range((view, 0)..=(view, usize::MAX));
-        of_view.map(|((_, frame), holders)| (*frame, holders)).filter(|(frame, _)| frames.binary_search(frame).is_ok())
+    fn pictures_of_view<'a>(&'a self, view: usize, frames: &'a [usize]) -> impl Iterator<Item = (usize, &'a Holders)> {
+        let all = self.pictures.range((view, 0)..=(view, usize::MAX));
+        all.map(|((_, frame), holders)| (*frame, holders)).filter(|(frame, _)| frames.binary_search(frame).is_ok())
     }
 
     /// The sums of a picture, in the order of a record, and whether samples are missing.
     fn sums(&self, holders: &Holders) -> Result<(Vec<Vec<f64>>, bool)> {
         let record = |(part, n): &(usize, usize)| &self.parts[*part].head.pictures[*n];
         let missing = holders.iter().any(|holder| record(holder).missing);
-        let mut planes = vec![vec![0.0; self.look().pixels()]; self.look().planes(missing)];
+        let mut planes = vec![vec![0.0; self.setup().pixels()]; self.setup().planes(missing)];
         for holder in holders {
-            self.parts[holder.0].add_picture(record(holder), (&mut planes, missing))?;
+            self.parts[holder.0].add_picture(record(holder), &mut planes, missing)?;
         }
         Ok((planes, missing))
     }
 
     /// The sums of weights of some parts.
     fn weight_sums(&self, view: usize, parts: &[usize]) -> Result<Vec<f64>> {
-        let mut sums = vec![0.0; self.look().pixels()];
+        let mut sums = vec![0.0; self.setup().pixels()];
         parts.iter().try_for_each(|part| self.parts[*part].add_weights(view, &mut sums))?;
         Ok(sums)
     }
@@ -263,7 +267,8 @@ impl Total {
         &self,
         setup: &'a ViewSetup,
         config: &RenderConfig,
-        (view, parts): (usize, &[usize]),
+        view: usize,
+        parts: &[usize],
     ) -> Result<WeightSums<'a>> {
         let whole = [setup.clip];
         let boxes = if self.is_whole() { &whole[..] } else { &self.boxes };
@@ -271,7 +276,7 @@ impl Total {
     }
 
     fn check_memory(&self) -> Result<()> {
-        let (least, [width, height]) = (self.least_memory(), self.look().views[0].size);
+        let (least, [width, height]) = (self.least_memory(), self.setup().views[0].size);
         if least <= self.memory {
             return Ok(());
         }
@@ -300,11 +305,11 @@ impl Total {
     fn uneven(&self, frame: usize, holders: &Holders, own: &[Region]) -> Error {
         let first = self.frames()[0];
         let name = |holders: &Holders| self.parts[holders[0].0].path().display().to_string();
-        let lacking = self.boxes.iter().find(|of| !own.contains(of));
+        let lacking = self.boxes.iter().find(|voxels| !own.contains(voxels));
         let other = self.pictures.values().next().map(name).unwrap_or_default();
         let what = match lacking {
-            Some(of) => {
-                format!("frame {frame} lacks the voxels {of} that frame {first} has in {other}; a part is missing")
+            Some(voxels) => {
+                format!("frame {frame} lacks the voxels {voxels} that frame {first} has in {other}; a part is missing")
             }
             None => format!("frame {frame} has voxels that frame {first} lacks in {other}; a part is missing"),
         };
@@ -313,13 +318,13 @@ impl Total {
 
     /// An error unless every view shows the same frames, if views are not paired with frames.
     fn check_frames(&self) -> Result<()> {
-        if self.look().paired.is_some() {
+        if self.setup().paired.is_some() {
             return Ok(());
         }
         let frames = self.frames();
         let lacks =
             |view: usize| frames.iter().find(|frame| !self.pictures.contains_key(&(view, **frame))).map(|f| (view, *f));
-        match (0..self.look().views.len()).find_map(lacks) {
+        match (0..self.setup().views.len()).find_map(lacks) {
             None => Ok(()),
             Some((view, frame)) => {
                 let path = self.parts[0].path();
@@ -329,29 +334,32 @@ impl Total {
     }
 }
 
-/// A picture of sums.
-fn picture(config: &RenderConfig, weights: &WeightSums<'_>, (planes, missing): (&[Vec<f64>], bool)) -> Vec<f32> {
+/// The picture of a total.
+fn picture(config: &RenderConfig, weights: &WeightSums<'_>, planes: &[Vec<f64>], missing: bool) -> Vec<f32> {
     let channels = planes.chunks(1 + usize::from(missing));
-    let finish = |of: &[Vec<f64>]| finished(config.quantity, weights, &of[0], of.get(1).map(Vec::as_slice));
+    let finish =
+        |channel: &[Vec<f64>]| finished(config.quantity, weights, &channel[0], channel.get(1).map(Vec::as_slice));
     let channels: Vec<Vec<f32>> = channels.map(finish).collect();
     match <[Vec<f32>; 1]>::try_from(channels) {
         Ok([only]) => only,
-        Err(channels) => (0..channels[0].len()).flat_map(|at| channels.iter().map(move |of| of[at])).collect(),
+        Err(channels) => {
+            (0..channels[0].len()).flat_map(|at| channels.iter().map(move |channel| channel[at])).collect()
+        }
     }
 }
 
 /// An error unless two parts are of the same pictures.
-fn check_alike((look, first): (&Look, &Path), part: &PartFile) -> Result<()> {
-    let Some(what) = look.difference(&part.head.look) else { return Ok(()) };
+fn check_alike(setup: &PictureSetup, first: &Path, part: &PartialFile) -> Result<()> {
+    let Some(what) = setup.difference(&part.head.look) else { return Ok(()) };
     let first = first.display();
     Err(Error::path(part.path(), format!("is not of the same pictures as {first}: they differ in {what}")))
 }
 
 /// An error unless files with the same frames are the same.
-fn check_sources(parts: &[PartFile]) -> Result<()> {
-    let mut all: Vec<(&Source, &PartFile)> =
-        parts.iter().flat_map(|part| part.head.sources.iter().map(move |of| (of, part))).collect();
-    all.sort_by_key(|(of, _)| of.frames);
+fn check_sources(parts: &[PartialFile]) -> Result<()> {
+    let mut all: Vec<(&PartialSource, &PartialFile)> =
+        parts.iter().flat_map(|part| part.head.sources.iter().map(move |source| (source, part))).collect();
+    all.sort_by_key(|(source, _)| source.frames);
     all.dedup_by(|(a, _), (b, _)| a == b);
     for pair in all.windows(2) {
         let [(a, first), (b, part)] = pair else { continue };
@@ -364,8 +372,8 @@ fn check_sources(parts: &[PartFile]) -> Result<()> {
     Ok(())
 }
 
-/// The pictures of all parts, and who adds to them.
-fn pictures(parts: &[PartFile]) -> Result<BTreeMap<(usize, usize), Holders>> {
+/// The pictures of all parts, with the parts that add to each.
+fn pictures(parts: &[PartialFile]) -> Result<BTreeMap<(usize, usize), Holders>> {
     let mut pictures: BTreeMap<(usize, usize), Holders> = BTreeMap::new();
     for (part, file) in parts.iter().enumerate() {
         for (n, PictureRecord { view, frame, .. }) in file.head.pictures.iter().enumerate() {
@@ -380,24 +388,24 @@ fn pictures(parts: &[PartFile]) -> Result<BTreeMap<(usize, usize), Holders>> {
 }
 
 /// The boxes of some parts, in the order of their voxels.
-fn boxes(parts: &[PartFile], holders: &Holders) -> Vec<Region> {
+fn boxes(parts: &[PartialFile], holders: &Holders) -> Vec<Region> {
     let mut boxes: Vec<Region> = holders.iter().flat_map(|(part, _)| parts[*part].head.boxes.iter().copied()).collect();
     boxes.sort_by_key(order);
     boxes
 }
 
 /// An error if parts of a picture share voxels.
-fn check_apart(parts: &[PartFile], holders: &Holders) -> Result<()> {
-    let of_part =
-        |(part, _): &(usize, usize)| parts[*part].head.boxes.iter().map(|of| (*of, *part)).collect::<Vec<_>>();
-    let mut all: Vec<(Region, usize)> = holders.iter().flat_map(of_part).collect();
+fn check_apart(parts: &[PartialFile], holders: &Holders) -> Result<()> {
+    let boxes =
+        |(part, _): &(usize, usize)| parts[*part].head.boxes.iter().map(|voxels| (*voxels, *part)).collect::<Vec<_>>();
+    let mut all: Vec<(Region, usize)> = holders.iter().flat_map(boxes).collect();
     if all.len() > MOST_BOXES {
         return Err(Error::setting(
             "inputs",
             format!("hold more than {MOST_BOXES} boxes of voxels; take fewer, larger regions"),
         ));
     }
-    all.sort_by_key(|(of, part)| (order(of), *part));
+    all.sort_by_key(|(voxels, part)| (order(voxels), *part));
     for (n, (a, first)) in all.iter().enumerate() {
         let near = all[n + 1..].iter().take_while(|(b, _)| b.start[2] < a.end[2]);
         if let Some((b, other)) = near.into_iter().find(|(b, _)| !a.intersect(b).is_empty()) {
@@ -412,8 +420,9 @@ fn check_apart(parts: &[PartFile], holders: &Holders) -> Result<()> {
     Ok(())
 }
 
-fn order(of: &Region) -> [usize; 6] {
-    let Region { start: [x, y, z], end: [u, v, w] } = *of;
+/// The key by which boxes are sorted: z, then y, then x.
+fn order(voxels: &Region) -> [usize; 6] {
+    let Region { start: [x, y, z], end: [u, v, w] } = *voxels;
     [z, y, x, w, v, u]
 }
 

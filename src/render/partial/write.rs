@@ -1,7 +1,7 @@
-//! Writes a part.
+//! Writes partial sums.
 
 use super::MAGIC;
-use super::look::{Head, Look, PictureRecord, Place, SCHEMA, Source, WeightRecord};
+use super::head::{Head, PartialSource, PictureRecord, PictureSetup, RecordSpan, SCHEMA, WeightRecord};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Region;
 use crate::render::PartialSums;
@@ -15,24 +15,38 @@ const LEVEL: i32 = 1;
 /// Numbers that are packed at a time.
 const TOGETHER: usize = 1 << 14;
 
-/// A part that is being written.
-pub struct PartWriter<W> {
+/// A file of partial sums that is being written.
+pub struct PartialWriter<W> {
     out: W,
     name: PathBuf,
     at: u64,
     head: Head,
 }
 
-impl<W: Write> PartWriter<W> {
-    /// Begins a part of these voxels and files. Messages call it `name`.
+impl<W: Write> PartialWriter<W> {
+    /// Begins the sums over these voxels and files. Messages call the output `name`.
     ///
     /// # Errors
-    /// A look that no picture can have, or failed writes.
-    pub fn new((name, mut out): (&Path, W), look: Look, (boxes, sources): (Vec<Region>, Vec<Source>)) -> Result<Self> {
+    /// Settings that no picture can have, or failed writes.
+    pub fn new(
+        name: &Path,
+        mut out: W,
+        setup: PictureSetup,
+        boxes: Vec<Region>,
+        sources: Vec<PartialSource>,
+    ) -> Result<Self> {
         let software = concat!("wavesplat-render ", env!("CARGO_PKG_VERSION")).into();
-        let (weights, pictures) = (Vec::new(), Vec::new());
-        let head =
-            Head { schema: SCHEMA, software, look, boxes, sources, sample_error: 0.0, damage: None, weights, pictures };
+        let head = Head {
+            schema: SCHEMA,
+            software,
+            look: setup,
+            boxes,
+            sources,
+            sample_error: 0.0,
+            damage: None,
+            weights: Vec::new(),
+            pictures: Vec::new(),
+        };
         head.check(0).map_err(|what| Error::path(name, what))?;
         out.write_all(&MAGIC).map_err(|e| Error::io(name, "writing", e))?;
         Ok(Self { out, name: name.into(), at: MAGIC.len() as u64, head })
@@ -56,7 +70,7 @@ impl<W: Write> PartWriter<W> {
         Ok(())
     }
 
-    /// Ends the part. No splatted sample is off by more than `sample_error`, but for what was left out as damaged.
+    /// Ends the file. No splatted sample is off by more than `sample_error`, but for what was left out as damaged.
     ///
     /// # Errors
     /// Failed writes.
@@ -71,10 +85,10 @@ impl<W: Write> PartWriter<W> {
         Ok(self.out)
     }
 
-    fn record(&mut self, planes: &[&[f64]]) -> Result<Place> {
+    fn record(&mut self, planes: &[&[f64]]) -> Result<RecordSpan> {
         let mut counted = Counted { out: &mut self.out, bytes: 0, digest: Xxh3::new() };
         pack(planes, &mut counted).map_err(|e| Error::io(&self.name, "writing", e))?;
-        let place = Place { offset: self.at, bytes: counted.bytes, checksum: counted.digest.digest() };
+        let place = RecordSpan { offset: self.at, bytes: counted.bytes, checksum: counted.digest.digest() };
         self.at += place.bytes;
         Ok(place)
     }

@@ -1,6 +1,7 @@
 //! Files of partial sums, each over some of the voxels or frames; and pictures made from such files.
 //!
-//! A part is small, however large its archive is: a number or two for each pixel and frame. Numbers are little-endian.
+//! A file of partial sums is small, however large its archive is: a number or two for each pixel and frame. Numbers are
+//! little-endian.
 //!
 //! ```text
 //! 8 bytes      89 57 50 41 52 54 0d 0a, the magic
@@ -12,17 +13,17 @@
 //! A record holds the weights of a view; or of a picture the emissions of each channel, each followed by the weights of its
 //! missing samples if there are any. Parts are added in the order of their voxels, in whatever order they are given.
 
-mod look;
+mod head;
 mod write;
 mod read;
 mod total;
 
-pub use look::{Head, Look, Source};
-pub use read::{PartFile, is_part};
-pub use total::Total;
-pub use write::PartWriter;
+pub use head::{Head, PartialSource, PictureSetup};
+pub use read::{PartialFile, is_partial};
+pub use total::PartialTotal;
+pub use write::PartialWriter;
 
 const MAGIC: [u8; 8] = *b"\x89WPART\r\n";
 
-/// Bytes behind the head.
+/// Bytes after the head.
 const END: usize = 40;
