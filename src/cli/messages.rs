@@ -51,7 +51,7 @@ fn long_option(setting: &str, command: &Command) -> Option<String> {
     is_option.then(|| format!("--{name}"))
 }
 
-/// A text with options in place of the fields that it has in backquotes. What is no option stays.
+/// A text with options in place of the fields in backquotes. Words that are no fields stay.
 fn with_options(text: &str, command: &Command) -> String {
     let parts: Vec<&str> = text.split('`').collect();
     let option = |quoted: &str| long_option(quoted, command).unwrap_or_else(|| format!("`{quoted}`"));

@@ -23,7 +23,7 @@ pub(crate) struct Axis {
 pub(crate) struct Axes([Axis; 3]);
 
 impl Axes {
-    /// The axes of a grid with true heights, and what its source says of them.
+    /// The axes of a grid with true heights, with names and units from the source's description.
     pub(crate) fn new(grid: &Grid, description: Option<&Description>) -> Self {
         Self(std::array::from_fn(|along| Axis::new(grid, description, along)))
     }

@@ -44,7 +44,7 @@ impl Colouring {
     }
 }
 
-/// What decides the colours of pictures.
+/// The settings and facts that decide the colours of pictures.
 pub(super) struct ColouringInput<'a> {
     pub(super) request: &'a PictureRequest,
     /// Numbers of a sample.

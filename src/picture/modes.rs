@@ -1,4 +1,4 @@
-//! How the samples along a ray make a pixel, and what may be asked of each mode.
+//! How the samples along a ray make a pixel, and which settings each mode accepts.
 
 use super::request::PictureRequest;
 use super::values::ModeName;

@@ -75,7 +75,7 @@ struct Planned {
     voxels: Region,
 }
 
-/// Sets what the first of some partial sums says of their pictures.
+/// Takes the settings of the pictures from the first of some partial sums.
 pub(super) fn imply_setup(request: &PictureRequest, inputs: &[PathBuf], memory: usize) -> Result<PictureRequest> {
     let Some(first) = inputs.first() else { return Ok(request.clone()) };
     let setup = PartialFile::open(first, memory)?.head.look;

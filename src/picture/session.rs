@@ -1,4 +1,4 @@
-//! What pictures are made of, open for many of them.
+//! The inputs of pictures, kept open for many pictures.
 
 use super::opened::FRAMES_HINT;
 use super::reporter::Reporter;

@@ -34,7 +34,7 @@ impl Sinks {
     }
 }
 
-/// What the sinks of a run need.
+/// The input of the sinks of a run.
 pub(super) struct SinkInput<'a> {
     pub(super) request: &'a PictureRequest,
     pub(super) config: &'a RenderConfig,

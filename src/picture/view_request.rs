@@ -1,4 +1,4 @@
-//! A request of the viewer's page, which is trusted with nothing but numbers and known names.
+//! A request of the viewer's page. It may hold only numbers and known names, since the page is not trusted.
 
 use super::request::PictureRequest;
 use super::values::{AxisPosition, ClearSpec, Detail, ModeName, SliceSpec, SurfaceList, Theme, ViewAngles};
@@ -91,7 +91,7 @@ impl ViewRequest {
         request.check().map_or(Ok(request), |what| Err(Error::usage(what)))
     }
 
-    /// What is wrong with the request, if anything is.
+    /// The problem with the request, if there is one.
     fn check(&self) -> Option<String> {
         let places = self.iso.len().max(self.slices.len()).max(self.opacity.as_ref().map_or(0, Vec::len));
         let [first, end] = self.frames;

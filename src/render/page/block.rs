@@ -40,7 +40,7 @@ struct Head {
     step: f32,
     /// Bytes of each coded plane; 0 for a plane of zeros.
     lengths: Vec<usize>,
-    /// Bytes that tell which numbers are missing; 0 if none is.
+    /// Bytes that mark missing numbers; 0 if none is missing.
     missing: usize,
 }
 
@@ -141,7 +141,7 @@ fn fill_from(planes: &mut [Vec<f32>], n: usize, from: usize) {
 }
 
 /// The orthonormal Haar transform over time of each number, in place: sums of 2, 4, 8, ... pictures stay at the first of
-/// these, and differences at the first of the second half. What has no partner stays as it is.
+/// these, and differences at the first of the second half. A picture without a partner is not changed.
 fn haar(planes: &mut [Vec<f32>], numbers: usize) {
     let mut half = numbers;
     while half < planes.len() {

@@ -24,7 +24,7 @@ const SCRIPT: &str = concat!(
     include_str!("web/player.js"),
     include_str!("web/stored.js"),
 );
-/// What a page needs besides, if it asks a server for pictures.
+/// The scripts for pages that ask a server for pictures.
 #[cfg(feature = "view")]
 const LIVE: &str = concat!(
     include_str!("web/camera.js"),

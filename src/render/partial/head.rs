@@ -93,7 +93,7 @@ pub struct Head {
     pub sources: Vec<PartialSource>,
     /// Error bound of every splatted sample.
     pub sample_error: f64,
-    /// What was left out as damaged, if anything was.
+    /// The damage that was left out, if there was any.
     pub damage: Option<String>,
     /// The weights of views.
     pub(super) weights: Vec<WeightRecord>,
