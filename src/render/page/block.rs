@@ -331,10 +331,10 @@ mod tests {
         found
     }
 
-    fn planes(pictures: usize, numbers: usize, of: impl Fn(usize, usize) -> f32) -> Planes {
+    fn planes(pictures: usize, numbers: usize, number: impl Fn(usize, usize) -> f32) -> Planes {
         let mut planes = Planes::new([7, 5], numbers, false);
         for t in 0..pictures {
-            planes.push(&(0..35 * numbers).map(|at| of(t, at)).collect::<Vec<_>>(), |value| value);
+            planes.push(&(0..35 * numbers).map(|at| number(t, at)).collect::<Vec<_>>(), |value| value);
         }
         planes
     }
@@ -360,8 +360,8 @@ mod tests {
 
     #[test]
     fn codes_of_any_size_come_back() {
-        let of = |t: usize, at: usize| if (at + t).is_multiple_of(2) { 1e30 } else { -1e30 };
-        let planes = planes(2, 1, of);
+        let number = |t: usize, at: usize| if (at + t).is_multiple_of(2) { 1e30 } else { -1e30 };
+        let planes = planes(2, 1, number);
         let found = decoded(&planes.clone().coded(1e-3).expect("a block"));
         for (a, b) in planes.planes.iter().flatten().zip(found.iter().flatten()) {
             assert!((a - b).abs() < 1e24, "{a} {b}");
