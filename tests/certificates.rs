@@ -7,7 +7,7 @@ use crate::coefficients::{Trial, doubles, views};
 use crate::common::random::Random;
 use crate::common::views::{SKEWED, archive, field, truth, values, view};
 use crate::common::{direct, looking, pictures, rendered, settings, stored};
-use crate::images::{bits, under_less_memory};
+use crate::frame_pictures::{bits, under_less_memory};
 use crate::reference::splat::{BACKGROUND, Images};
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;

@@ -4,7 +4,7 @@ use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
 use crate::common::{Stored, extracted_channel, looking, pictures, rendered, settings, stored, windows};
-use crate::images::{bits, under_less_memory};
+use crate::frame_pictures::{bits, under_less_memory};
 use crate::reference::colour::{Point, colour};
 use crate::reference::splat::Images;
 use wavesplat::base::grid::Grid;

@@ -5,7 +5,7 @@ use crate::common::random::Random;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::views::{SKEWED, archive, field, largest, rounding, truth, values, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored, windows};
-use crate::images::{bits, under_less_memory};
+use crate::frame_pictures::{bits, under_less_memory};
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound, ConvertConfig};

@@ -2,7 +2,7 @@
 
 use crate::common::views::{archive, field, of_reference, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored};
-use crate::images::under_less_memory;
+use crate::frame_pictures::under_less_memory;
 use crate::reference::ray::Rays;
 use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};

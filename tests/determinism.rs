@@ -4,7 +4,7 @@ use crate::common::memory::Memory;
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::views::view;
 use crate::common::{BASES, direct, extracted, looking, pictures, settings, stored};
-use crate::images::bits;
+use crate::frame_pictures::bits;
 use std::path::Path;
 use std::process::Command;
 use wavesplat::base::grid::Grid;

@@ -103,7 +103,7 @@ fn source(seed: usize, (ty, kind, mask): (SampleType, Kind, Mask)) -> Memory {
 
 /// Packing a file anew changes no sample, no statistics and no lost block.
 #[test]
-fn golden_files_are_packed_anew_with_the_same_samples() {
+fn golden_files_are_repacked_with_the_same_samples() {
     let work = tempfile::tempdir().unwrap();
     for (name, digest) in digests() {
         let (old, mut bytes) = (open(&folder().join(format!("{name}.wspl"))), Vec::new());

@@ -2,7 +2,7 @@
 
 use crate::common::views::{archive, field, largest, rounding, truth, view};
 use crate::common::{direct, looking, pictures, settings, stored};
-use crate::images::under_less_memory;
+use crate::frame_pictures::under_less_memory;
 use crate::reference::splat::Images;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;

@@ -9,7 +9,7 @@ use crate::record::{decode_exact, encode};
 use crate::{Error, Result};
 use bincode::{Decode, Encode};
 
-/// What the source says beside its samples.
+/// The description of the source besides its samples.
 #[derive(Debug, Clone, Default, PartialEq, Encode, Decode)]
 pub struct Description {
     /// Name of the source's format.
@@ -44,13 +44,13 @@ pub struct Dimension {
 pub struct ArrayAxis {
     /// Index of its dimension.
     pub dimension: u32,
-    /// What it counts.
+    /// Its role.
     pub role: AxisRole,
     /// Whether the source stores it from the last voxel to the first.
     pub reversed: bool,
 }
 
-/// What an axis of the samples' array counts. New roles are only appended.
+/// The role of an axis of the samples' array. New roles are only appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Encode, Decode)]
 pub enum AxisRole {
     /// Frames.

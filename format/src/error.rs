@@ -20,7 +20,7 @@ pub enum Error {
         offset: u64,
         /// The structure at that offset, such as "footer" or "window 3 block 7 level 2".
         place: String,
-        /// What is wrong.
+        /// The problem.
         what: String,
     },
     /// A block whose data were missing or damaged when the file was recovered or merged.
@@ -32,7 +32,7 @@ pub enum Error {
     /// A size beyond the limits of the format.
     #[error("{what}: {size} is over the limit of {limit}")]
     TooLarge {
-        /// What is too large.
+        /// The part that is too large.
         what: String,
         /// Its size.
         size: u64,

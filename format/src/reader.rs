@@ -25,7 +25,7 @@ pub struct Reader<S: Storage> {
     index: Index,
 }
 
-/// What is read when a file is opened.
+/// The parts that are read when a file is opened.
 #[derive(Debug)]
 struct Index {
     features: Features,
@@ -72,7 +72,7 @@ impl<S: Storage> Reader<S> {
         self.index.footer.id
     }
 
-    /// Reads what the source says beside its samples; `None` if the file has no description.
+    /// Reads the source's description; `None` if the file has none.
     ///
     /// # Errors
     /// [`Error::Corrupt`] if the description is damaged, [`Error::Io`] if the storage fails.

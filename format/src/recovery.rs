@@ -26,7 +26,7 @@ pub struct Recovery {
     id: FileId,
     /// Metadata with the described windows, without the totals of their blocks.
     metadata: Metadata,
-    /// The totals of windows, as far as they were found.
+    /// The totals of the windows that were found.
     ends: BTreeMap<u32, WindowEnd>,
     /// Windows without a description of their coding.
     undescribed: Vec<u32>,

@@ -43,7 +43,7 @@ pub(crate) fn refuse_frames(inputs: &[PathBuf]) -> Result<()> {
     remote.map_or(Ok(()), |input| Err(Error::path(public_name(input), what)))
 }
 
-/// An address without what only the server should know: name, password, and signatures in the query.
+/// An address without its secrets: user name, password, and signatures in the query.
 pub fn public_name(address: &Path) -> PathBuf {
     let text = address.to_string_lossy();
     let text = text.split(['?', '#']).next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Work that somebody waits for: its progress, and whether it was cancelled.
+//! Progress and cancellation of work for a caller that waits for the result.
 
 use super::progress::Progress;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -1,4 +1,4 @@
-//! What a source says beside its samples ([`Description`]): its part for some frames and voxels, and those of several
+//! The [`Description`] of a source: its part for some frames and voxels, and those of several
 //! sources one after another in time.
 
 pub use wavesplat_format::{

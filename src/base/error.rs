@@ -105,7 +105,7 @@ pub enum Error {
     },
 }
 
-/// A file is no longer what it was when it was opened; how that was noticed. Stored in an [`io::Error`].
+/// A file has changed since it was opened; the text says how that was noticed. Stored in an [`io::Error`].
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct ChangedSince(pub(crate) String);

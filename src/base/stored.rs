@@ -74,7 +74,7 @@ impl StoredType {
         if self.is_64_bit() { 8 } else { self.sample().size() }
     }
 
-    /// What it is called in messages.
+    /// Its name in messages.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::I64 => "i64",

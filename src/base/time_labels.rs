@@ -87,7 +87,7 @@ impl TimeLabels {
         (0..self.times.len()).filter_map(|frame| self.date(frame)).collect()
     }
 
-    /// What `info` says: the first and the last time, with their dates. None without times.
+    /// A summary for `info`: the first and the last time, with their dates. None without times.
     pub fn span(&self) -> Option<String> {
         let last = self.times.len().checked_sub(1)?;
         let numbers = format!("{} to {} {}", self.number(0)?, self.number(last)?, self.unit);

@@ -109,7 +109,7 @@ impl File<'_> {
                 return Err(self.wrong(&name.span(), &what));
             };
             for (key, value) in entries {
-                let option = self.option(owner, (key.get_ref(), &key.span()), (value.get_ref(), given))?;
+                let option = self.option(owner, key.get_ref(), &key.span(), value.get_ref(), given)?;
                 if owner.get_name() == command.get_name() {
                     own.push(key.get_ref());
                     options.extend(option);
@@ -119,7 +119,7 @@ impl File<'_> {
         for (key, value) in table.iter().filter(|(_, value)| !value.get_ref().is_table()) {
             self.check_known(key.get_ref(), &key.span())?;
             if find(command, key.get_ref()).is_some() && !own.contains(&key.get_ref().as_ref()) {
-                options.extend(self.option(command, (key.get_ref(), &key.span()), (value.get_ref(), given))?);
+                options.extend(self.option(command, key.get_ref(), &key.span(), value.get_ref(), given)?);
             }
         }
         Ok(options)
@@ -164,8 +164,10 @@ impl File<'_> {
     fn option(
         &self,
         owner: &Command,
-        (key, at): (&str, &Range<usize>),
-        (value, given): (&DeValue<'_>, &ArgMatches),
+        key: &str,
+        at: &Range<usize>,
+        value: &DeValue<'_>,
+        given: &ArgMatches,
     ) -> Result<Option<FileOption>> {
         let Some(arg) = find(owner, key) else { return Err(self.unknown(owner.get_name(), key, at)) };
         let args = arguments(arg, value).map_err(|what| self.wrong(at, &format!("{key}: {what}")))?;

@@ -211,7 +211,7 @@ impl InputArgs {
     /// stored in the file. The archive is narrowed to the file's region and to `frames`.
     pub fn open_again(
         &self,
-        of: &CoefficientFile,
+        file: &CoefficientFile,
         inputs: &[PathBuf],
         frames: Option<FrameRange>,
         common: &CommonArgs,
@@ -219,13 +219,13 @@ impl InputArgs {
         let options = OpenOptions {
             dims_are_remembered: !self.describes_layout(),
             variable_is_remembered: self.variable.is_none(),
-            clock: Some(times::units(of)),
+            clock: Some(times::units(file)),
             times: self.given_times()?,
-            ..self.completed(of)?.options(common.stream_memory())
+            ..self.completed(file)?.options(common.stream_memory())
         };
         let source = formats::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(n));
-        narrow(source, frames, remembered(of, "region")?)
+        narrow(source, frames, remembered(file, "region")?)
     }
 
     /// Whether an option that describes headerless data is given.
@@ -234,23 +234,23 @@ impl InputArgs {
     }
 
     /// These options, completed with those stored in a file.
-    fn completed(&self, of: &CoefficientFile) -> Result<Self> {
+    fn completed(&self, file: &CoefficientFile) -> Result<Self> {
         let mut input = self.clone();
-        complete(&mut input.variable, of, "variable")?;
+        complete(&mut input.variable, file, "variable")?;
         if input.magnitude.is_empty() && self.variable.is_none() {
-            let names = setting(of.metadata(), "magnitude").unwrap_or_default();
+            let names = setting(file.metadata(), "magnitude").unwrap_or_default();
             input.magnitude = names.split(',').filter(|name| !name.is_empty()).map(String::from).collect();
         }
-        complete(&mut input.axes, of, "axes")?;
-        complete(&mut input.spacing, of, "spacing")?;
-        complete(&mut input.origin, of, "origin")?;
-        complete(&mut input.time_unit, of, "time-unit")?;
+        complete(&mut input.axes, file, "axes")?;
+        complete(&mut input.spacing, file, "spacing")?;
+        complete(&mut input.origin, file, "origin")?;
+        complete(&mut input.time_unit, file, "time-unit")?;
         // Without dims, dtype is the type of the samples before they were coloured.
-        if setting(of.metadata(), "dims").is_some() {
-            complete(&mut input.dims, of, "dims")?;
-            complete(&mut input.dtype, of, "dtype")?;
-            complete(&mut input.endian, of, "endian")?;
-            complete(&mut input.offset, of, "offset")?;
+        if setting(file.metadata(), "dims").is_some() {
+            complete(&mut input.dims, file, "dims")?;
+            complete(&mut input.dtype, file, "dtype")?;
+            complete(&mut input.endian, file, "endian")?;
+            complete(&mut input.offset, file, "offset")?;
         }
         Ok(input)
     }
@@ -258,17 +258,17 @@ impl InputArgs {
 
 /// Fills an option that was not given with the value stored in a file.
 #[cfg(feature = "cli")]
-fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, of: &CoefficientFile, name: &str) -> Result<()> {
+fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, file: &CoefficientFile, name: &str) -> Result<()> {
     if option.is_none() {
-        *option = remembered(of, name)?;
+        *option = remembered(file, name)?;
     }
     Ok(())
 }
 
 /// A setting of the conversion that is stored in a file.
-pub fn remembered<T: FromStr<Err: fmt::Display>>(of: &CoefficientFile, name: &str) -> Result<Option<T>> {
-    let parsed = |what: T::Err| Error::input(of.path(), format!("its setting {name} is not understood: {what}"));
-    setting(of.metadata(), name).map(str::parse).transpose().map_err(parsed)
+pub fn remembered<T: FromStr<Err: fmt::Display>>(file: &CoefficientFile, name: &str) -> Result<Option<T>> {
+    let parsed = |what: T::Err| Error::input(file.path(), format!("its setting {name} is not understood: {what}"));
+    setting(file.metadata(), name).map(str::parse).transpose().map_err(parsed)
 }
 
 /// Options that choose frames and voxels of an archive.

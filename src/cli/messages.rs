@@ -6,7 +6,7 @@ use clap::Command;
 use std::borrow::Cow;
 
 /// The text of an error, with a tip if it has a remedy.
-pub fn of_error(error: &Error, command: &Command) -> String {
+pub fn error_text(error: &Error, command: &Command) -> String {
     let text = match error {
         Error::Setting { setting, problem, .. } => {
             format!("error: {}: {}", option(setting, command), with_options(problem, command))
@@ -24,7 +24,7 @@ pub(super) fn of_picture(text: &str) -> String {
 }
 
 /// The text of a note, with advice if it has a remedy.
-pub fn of_note(note: &Note) -> String {
+pub fn note_text(note: &Note) -> String {
     note.remedy.as_ref().map_or(note.text.clone(), |remedy| format!("{note}; {}", advice(remedy)))
 }
 
@@ -58,7 +58,7 @@ fn long_option(setting: &str, command: &Command) -> Option<String> {
     is_option.then(|| format!("--{name}"))
 }
 
-/// A text with options in place of the fields that it has in backquotes. What is no option stays.
+/// A text with options in place of the fields in backquotes. Words that are no fields stay.
 fn with_options(text: &str, command: &Command) -> String {
     let parts: Vec<&str> = text.split('`').collect();
     let option = |quoted: &str| long_option(quoted, command).unwrap_or_else(|| format!("`{quoted}`"));
@@ -148,15 +148,15 @@ mod tests {
         let found = ["splat_error", "sample", "inputs", "some_field"].map(|field| option(field, &command()));
         assert_eq!(found, ["--splat-error", "--dtype", "inputs", "some field"]);
         let error = Error::setting("sample", Note::with("is wrong", Remedy::Adjust(&["dims", "sample", "offset"])));
-        let text = of_error(&error, &command());
+        let text = error_text(&error, &command());
         assert_eq!(text, "error: --dtype: is wrong\n  tip: adjust --dims, --dtype or --offset");
-        let text = of_error(&Error::setting("splat_error", "needs `sample`, not `a b`"), &command());
+        let text = error_text(&Error::setting("splat_error", "needs `sample`, not `a b`"), &command());
         assert_eq!(text, "error: --splat-error: needs --dtype, not `a b`");
     }
 
     #[test]
     fn notes_end_with_what_can_be_done() {
-        assert_eq!(of_note(&"a".into()), "a");
-        assert_eq!(of_note(&Note::with("a", Remedy::Set("axes"))), "a; --axes changes this");
+        assert_eq!(note_text(&"a".into()), "a");
+        assert_eq!(note_text(&Note::with("a", Remedy::Set("axes"))), "a; --axes changes this");
     }
 }

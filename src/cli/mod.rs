@@ -19,7 +19,7 @@ mod config;
 mod generate;
 mod input;
 #[cfg(feature = "cli")]
-mod lines;
+mod json_progress;
 mod messages;
 #[cfg(feature = "cli")]
 mod optional;
@@ -44,7 +44,7 @@ pub use common::CommonArgs;
 #[cfg(feature = "cli")]
 pub use generate::{GenerateArgs, Generated};
 pub use input::{InputArgs, SelectArgs, narrow, remembered};
-pub use messages::{advice, of_error as error_text, of_note as note_text};
+pub use messages::{advice, error_text, note_text};
 #[cfg(feature = "cli")]
 use program::other_program;
 #[cfg(feature = "cli")]

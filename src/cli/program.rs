@@ -66,7 +66,7 @@ fn end(signal: i32) {
 }
 
 fn failed<A: Parser>(error: &Error) -> ExitCode {
-    note(messages::of_error(error, &command::<A>()));
+    note(messages::error_text(error, &command::<A>()));
     ExitCode::from(error.exit_code())
 }
 

@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar for people, lines for programs, or nothing.
 
-use super::lines::Lines;
+use super::json_progress::JsonProgress;
 use crate::base::progress::Progress;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -22,14 +22,14 @@ pub enum TerminalProgress {
     /// A bar on standard error, if it is a terminal.
     Bar(Bar),
     /// Lines of JSON on standard error.
-    Lines(Lines),
+    Json(JsonProgress),
 }
 
 impl TerminalProgress {
     /// Progress of a stage that counts `unit`s.
     pub fn new(kind: ProgressKind, stage: &'static str, unit: &'static str) -> Self {
         let target = match kind {
-            ProgressKind::Json => return Self::Lines(Lines::new(stage, unit)),
+            ProgressKind::Json => return Self::Json(JsonProgress::new(stage, unit)),
             ProgressKind::Auto => ProgressDrawTarget::stderr(),
             ProgressKind::None => ProgressDrawTarget::hidden(),
         };
@@ -41,28 +41,28 @@ impl Progress for TerminalProgress {
     fn start(&self, steps: Option<u64>) {
         match self {
             Self::Bar(bar) => bar.start(steps),
-            Self::Lines(lines) => lines.start(steps),
+            Self::Json(json) => json.start(steps),
         }
     }
 
     fn resume(&self, steps: u64) {
         match self {
             Self::Bar(bar) => bar.resume(steps),
-            Self::Lines(lines) => lines.resume(steps),
+            Self::Json(json) => json.resume(steps),
         }
     }
 
     fn advance(&self, steps: u64) {
         match self {
             Self::Bar(bar) => bar.bar.inc(steps),
-            Self::Lines(lines) => lines.advance(steps),
+            Self::Json(json) => json.advance(steps),
         }
     }
 
     fn finish(&self) {
         match self {
             Self::Bar(bar) => bar.bar.finish_and_clear(),
-            Self::Lines(lines) => lines.write_last(),
+            Self::Json(json) => json.write_last(),
         }
     }
 }

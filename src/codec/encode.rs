@@ -34,10 +34,10 @@ pub struct Encoder {
     raw: Vec<u8>,
 }
 
-/// A coded block, and what its bytes do not contain.
+/// A coded block, and facts that its bytes do not contain.
 #[derive(Debug)]
 pub struct Encoded {
-    /// What the file stores.
+    /// The parts that the file stores.
     pub block: EncodedBlock,
     /// The largest share of a series, rounded up: its error divided by its bound.
     pub share: f64,

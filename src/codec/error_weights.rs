@@ -44,7 +44,7 @@ impl QuantizerSetup {
         Self { bound: codec.bound, sample: codec.sample, floor: 0.0, common: Some(reciprocal(error)), step }
     }
 
-    /// The setup for a relative bound. The step suits all but the smallest samples, as far as 32-bit codes of the
+    /// The setup for a relative bound. The step suits all but the smallest samples, if 32-bit codes of the
     /// largest permit.
     fn relative(codec: &WindowCodec, magnitude: f64, floor: f64) -> Self {
         let mut found = Self { bound: codec.bound, sample: codec.sample, floor, common: None, step: 1.0 };

@@ -1,4 +1,4 @@
-//! How values are distributed: the value of empty space, and opacities that show what is rare.
+//! The distribution of values: the value of empty space, and opacities that show rare values.
 
 /// Finite values in ascending order.
 #[derive(Debug, Clone, Default)]

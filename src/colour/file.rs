@@ -5,7 +5,7 @@ use crate::base::error::{Error, Result};
 use crate::base::text;
 use std::path::Path;
 
-/// What a file is expected to be.
+/// The kind of file that is expected, for messages.
 const KIND: &str = "colour map";
 
 /// Splits `FILE.json#MAP` into the file and the name of the map.

@@ -10,7 +10,7 @@ pub(super) fn is_list(name: &str) -> bool {
 /// A map whose colours are at even steps of the range, with linear interpolation.
 ///
 /// # Errors
-/// What is wrong with the list: a sentence that follows it.
+/// The problem with the list: a sentence that follows it.
 pub(super) fn parse(list: &str) -> Result<TransferFunction, String> {
     let colours = list.split(',').map(colour).collect::<Result<Vec<_>, _>>()?;
     let last = (colours.len() - 1) as f64;

@@ -89,7 +89,7 @@ pub(super) struct WindowReader<'a> {
     id: Option<FileId>,
     /// The features of the file.
     features: Features,
-    /// What was seen in the samples.
+    /// The result of scanning the samples.
     findings: Findings,
     /// The scheme of the window before.
     scheme: Option<Scheme>,

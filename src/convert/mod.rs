@@ -238,7 +238,7 @@ pub struct ResumePoint {
     pub description: Option<Description>,
 }
 
-/// What a conversion writes to.
+/// The output of a conversion.
 #[derive(Debug)]
 pub struct Target<'a, W> {
     /// What messages call it.

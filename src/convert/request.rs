@@ -1,4 +1,4 @@
-//! What can be asked of a conversion, in the words of the programs' options and of Python's arguments.
+//! The request for a conversion, in the words of the programs' options and of Python's arguments.
 
 use super::plan::check_max_error;
 use super::shard::{ArchiveScan, Shard, sharded};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 use std::path::PathBuf;
 use wavesplat_format::{Basis, Bound};
 
-/// What can be asked of a conversion. [`run`](super::run) completes it with what the frames say.
+/// The request for a conversion. [`run`](super::run) completes it from the frames.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConvertRequest {
@@ -89,7 +89,7 @@ impl Default for ConvertRequest {
 const TOLERANCE: f64 = 0.01;
 
 impl ConvertRequest {
-    /// Checks what can be told without the frames: settings that contradict each other.
+    /// Checks the settings without the frames: some contradict each other.
     ///
     /// # Errors
     /// [`Error::Setting`]; other fields that its text names are in backquotes.
@@ -135,7 +135,7 @@ impl ConvertRequest {
         Ok((source, config))
     }
 
-    /// This request, completed with what an archive says of its samples.
+    /// This request, completed from an archive's description.
     fn config(&self, archive: &Archive) -> Result<ConvertConfig> {
         let is_declared = archive.missing.is_some() || self.missing_value.is_some();
         let missing = if is_declared { MissingPolicy::Mask } else { MissingPolicy::Error };

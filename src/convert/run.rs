@@ -1,4 +1,4 @@
-//! Conversions into a file that gets its name when it is complete, with what becomes of earlier ones.
+//! Conversions into a file that gets its name when it is complete, resumed or started anew.
 
 use super::coded_input::CodedInput;
 use super::plan::Plan;
@@ -12,7 +12,7 @@ use crate::source::{Archive, FrameSource};
 use std::path::{Path, PathBuf};
 use wavesplat_format::Metadata;
 
-/// Why a conversion failed, and what it leaves.
+/// The error of a conversion, and whether its unfinished file stays.
 #[derive(Debug)]
 pub struct Failure {
     /// Why it failed.

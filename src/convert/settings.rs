@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer};
 use std::str::FromStr;
 use wavesplat_format::Metadata;
 
-/// The settings of a conversion. What the metadata holds anyway is not repeated.
+/// The settings of a conversion, without those that the metadata holds.
 pub(super) fn stored_settings(input: &CodedInput) -> Vec<(String, String)> {
     let CodedInput { config, archive, colour_transform } = input;
     let ConvertConfig { coding, window, level, missing, range, .. } = config;

@@ -125,7 +125,7 @@ const SCHEMA: u32 = 1;
 const MOST_BYTES: u64 = 1 << 20;
 
 impl ArchiveScan {
-    /// Scans all frames of an archive, or a shard's share of them. `declared` is the value that means "missing".
+    /// Scans all frames of an archive, or those of a shard. `declared` is the value that means "missing".
     ///
     /// # Errors
     /// A stream, or frames that cannot be read.

@@ -1,4 +1,4 @@
-//! What a user should know about a conversion that succeeded, and what to change.
+//! Warnings about a conversion that succeeded, with remedies.
 
 use super::variation::Variation;
 use super::{ConvertConfig, ConvertReport};
@@ -8,7 +8,7 @@ use crate::codec::bound::Bound;
 use crate::source::extremes::{Extreme, is_customary, written};
 use wavesplat_format::Basis;
 
-/// What the reader saw in the samples.
+/// The reader's findings in the samples.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     /// A value that may mean "missing", if one was seen.
@@ -20,13 +20,13 @@ pub(super) struct Findings {
 
 /// An extreme dominates the range if its distance from the other samples is more than this many times their range.
 const FAR: f64 = 10.0;
-/// Beyond this distance, the bound would leave nothing of the other samples.
+/// Beyond this distance, the error bound would exceed the range of the other samples.
 const FARTHEST: f64 = 1000.0;
 
 /// One sample in this many is a noticeable share.
 const MANY: u64 = 100;
 
-/// What an extreme of the samples may mean.
+/// The possible meaning of an extreme of the samples.
 pub(super) enum Fill {
     /// It may mean "missing".
     Warn(Note),
@@ -111,7 +111,7 @@ fn round_down(value: f64) -> String {
     format!("{found:?}")
 }
 
-/// The file is larger than what it was made from.
+/// The file is larger than its source.
 fn larger_than_samples(config: &ConvertConfig, report: &ConvertReport) -> Option<Note> {
     if report.output_bytes <= report.input_bytes {
         return None;

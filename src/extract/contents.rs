@@ -1,4 +1,4 @@
-//! What is extracted, for the headers of files.
+//! The description of extracted samples, for the headers of files.
 
 use super::ExtractConfig;
 use crate::base::description::narrowed;

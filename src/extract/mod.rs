@@ -63,7 +63,7 @@ impl ExtractConfig {
     }
 }
 
-/// What an extraction did.
+/// The report of an extraction.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct ExtractReport {
     /// Frames written.

@@ -58,7 +58,7 @@ impl Files {
         self.samples[0].parent().filter(|_| matches!(self.format.writer().files, OutputFiles::List { .. }))
     }
 
-    /// Checks in advance that the files can be created, as far as that is possible.
+    /// Checks in advance, where possible, that the files can be created.
     fn check(&self, force: bool) -> Result<()> {
         if let Some(folder) = self.folder().filter(|folder| !folder.is_dir()) {
             self.last.iter().try_for_each(|list| Output::check(list, force))?;

@@ -47,7 +47,7 @@ pub struct CoefficientFile {
     pub(super) kept: Option<Arc<DecodedBlocks>>,
 }
 
-/// What is wrong with a file, block by block.
+/// The damage to a file, block by block.
 #[derive(Debug, Default)]
 struct Damage {
     blocks: BTreeMap<BlockId, String>,
@@ -183,7 +183,7 @@ impl CoefficientFile {
         self.reader.storage().len()
     }
 
-    /// What the source says beside its samples; `None` if the file has no description.
+    /// The source's description; `None` if the file has none.
     ///
     /// # Errors
     /// The description is damaged, or cannot be read.
@@ -305,7 +305,7 @@ impl CoefficientFile {
         Ok(self)
     }
 
-    /// What is wrong with the blocks of a leaf; an error if the storage fails.
+    /// The damage to the blocks of a leaf; an error if the storage fails.
     fn damage(&self, leaf: &LeafEntry) -> Result<Vec<(BlockId, String)>> {
         let entries = match self.reader.leaf(leaf) {
             Err(failed) if failed.is_io() => return Err(self.failed(failed)),
@@ -430,7 +430,7 @@ impl CoefficientFile {
         self.reader.storage().bytes_read()
     }
 
-    /// An error if a local file is no longer what it was when opened. Other storages report changes as they are read.
+    /// An error if a local file has changed since it was opened. Other storages report changes as they are read.
     pub fn check_unchanged(&self) -> Result<()> {
         self.state.map_or(Ok(()), |state| state.check_path(&self.path))
     }

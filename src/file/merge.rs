@@ -16,7 +16,7 @@ use wavesplat_format::{
     Writer,
 };
 
-/// What was merged.
+/// The report of a merge.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct MergeReport {
     /// Shards.

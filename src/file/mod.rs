@@ -1,4 +1,4 @@
-//! The `.wspl` file and its safety: opening it, reporting what it promises, checking it, and saving what is whole.
+//! The `.wspl` file and its safety: opening it, reporting its error bound, checking it, and recovering intact blocks.
 //!
 //! [`CoefficientFile`] is the only door to stored bytes. Nothing here codes samples (that is
 //! [`crate::convert`]) or makes pictures (that is [`crate::render`]).

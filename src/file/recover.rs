@@ -1,4 +1,4 @@
-//! A damaged coefficient file to a whole one of what can be saved. The damaged one is only read.
+//! Recovers the intact blocks of a damaged coefficient file into a new file. The damaged file is only read.
 
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::Path;
 use wavesplat_format::{BlockId, Recovery};
 
-/// What was saved, and what not.
+/// The report of a recovery: what was saved, and what was lost.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct RecoverReport {
     /// Frames of the new file.

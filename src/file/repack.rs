@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::Path;
 use wavesplat_format::{BlockEntry, EncodedBlock, Features, Metadata, Packing, Writer};
 
-/// What was packed anew.
+/// The report of a repacking.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct RepackReport {
     /// Frames of the file.

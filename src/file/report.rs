@@ -1,4 +1,4 @@
-//! What a coefficient file promises and what it reached, in numbers and words, for `convert` and `info`.
+//! The error bound of a coefficient file and the errors that it reached, in numbers and words, for `convert` and `info`.
 
 use super::promise::{max_error, range_of_shares, unit};
 use crate::codec::bound::Bound;
@@ -6,7 +6,7 @@ use crate::codec::scheme::Scheme;
 use serde::Serialize;
 use wavesplat_format::{Metadata, Window};
 
-/// What the tolerance promises.
+/// The error bound that the tolerance gives.
 #[derive(Debug, Clone, Serialize)]
 pub struct BoundReport {
     /// The kind of bound.
@@ -93,7 +93,7 @@ fn rounded(bound: f64) -> f64 {
     if shown >= bound { shown } else { near(bound * (1.0 + 5e-4)) }
 }
 
-/// What one window promised and reached, and what it holds.
+/// One window: its error bound, the errors that it reached, and its contents.
 #[derive(Debug, Clone, Serialize)]
 pub struct WindowReport {
     /// Its first frame.
@@ -148,7 +148,7 @@ impl WindowReport {
         }
     }
 
-    /// One line: what was promised and reached in the bound's own measure, and the errors of samples.
+    /// One line: the bound, and what was reached in the bound's own measure; and the errors of samples.
     pub fn line(&self, bound: Bound, tolerance: f64) -> String {
         let Self { first_frame, scheme, promised, reached, share, rms, .. } = self;
         let end = first_frame + u64::from(self.frames);

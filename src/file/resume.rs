@@ -14,7 +14,7 @@ use std::io::{self, Read};
 use std::path::Path;
 use wavesplat_format::{CompletePrefix, Error as FormatError, Window};
 
-/// What becomes of the whole windows of an earlier run that did not finish.
+/// What to do with the complete windows of an unfinished run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IfUnfinished {
     /// They are an error, so that they are neither overwritten nor continued by mistake.
@@ -26,7 +26,7 @@ pub enum IfUnfinished {
 }
 
 impl IfUnfinished {
-    /// What becomes of them with `resume`, or else with `force`.
+    /// The choice of the options `resume` and `force`.
     pub fn from_flags(force: bool, resume: bool) -> Self {
         match (resume, force) {
             (true, _) => Self::Resume,

@@ -82,7 +82,7 @@ impl ShardPlace {
     }
 }
 
-/// The metadata that shards share: what one conversion would begin with.
+/// The metadata that shards share: those with which one conversion would begin.
 pub(super) fn without_shard(of: &Metadata) -> Metadata {
     let mut start = of.start();
     start.settings.retain(|(name, _)| name != SHARD && name != SHARD_OF);

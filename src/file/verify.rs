@@ -1,4 +1,4 @@
-//! Is a coefficient file whole, and does it keep its promise?
+//! Verifies that a coefficient file is intact, and that it keeps its error bound.
 
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Region;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use wavesplat_format::{BlockEntry, PartKind};
 
-/// What a check of the file alone found.
+/// The result of checking a file, with its source if one is given.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct VerifyReport {
     /// Blocks that were read and decoded.
@@ -25,9 +25,9 @@ pub struct VerifyReport {
     pub damaged: u64,
     /// Blocks that could not be checked, since what lists them is damaged.
     pub unchecked: u64,
-    /// What is wrong with the first of them, at most [`MOST_NAMED`].
+    /// Descriptions of the first damage, at most [`MOST_NAMED`].
     pub damage: Vec<String>,
-    /// What the comparison of all blocks that are whole with the source found.
+    /// The comparison of all intact blocks with the source.
     pub against: Option<Comparison>,
 }
 
@@ -45,7 +45,7 @@ impl VerifyReport {
         }
     }
 
-    /// What was read, unless it is damaged, which is noted; an error if it could not be read for another reason.
+    /// The result of a read; `None` if it found damage, which is noted. Other failures are errors.
     fn whole<T>(&mut self, read: Result<T>) -> Result<Option<T>> {
         match read {
             Ok(read) => Ok(Some(read)),
@@ -58,7 +58,7 @@ impl VerifyReport {
     }
 }
 
-/// What a comparison with the source found.
+/// The result of a comparison with the source.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Comparison {
     /// Samples compared.

@@ -1,4 +1,4 @@
-//! What is written beside samples: their description, for the headers of all formats.
+//! The description of extracted samples, for the headers of all formats.
 
 use super::order::{OutputAxis, SampleOrder};
 use crate::base::description::{Attribute, Description, Orientation, Values, coordinates, is_regular};
@@ -87,7 +87,7 @@ pub struct Contents {
     pub space_units: Option<String>,
     /// The value of missing samples, if some may be missing: a number of the sample type, or NaN.
     pub missing: Option<f64>,
-    /// What the source says beside the samples, of these frames and voxels; none of a channel of colours.
+    /// The source's description of these frames and voxels; `None` for a channel of colours.
     pub description: Option<Description>,
 }
 

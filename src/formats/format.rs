@@ -1,4 +1,4 @@
-//! What a format is: its names, how its files are known, and how they are read and written.
+//! A format: its names, how its files are recognised, and how they are read and written.
 
 use super::arrays::ArrayArchive;
 use super::writer::Writer;
@@ -42,7 +42,7 @@ pub(crate) type Describe = fn(&Path, &OpenOptions, Extent) -> Result<FileHeader>
 /// Opens a file of arrays.
 pub(crate) type OpenArrays = fn(&Path, &OpenOptions) -> Result<ArrayArchive>;
 
-/// Among what a user may have to choose in a file.
+/// The variables or components of a file, from which the user may have to choose.
 pub(crate) enum Choices {
     /// Nothing: it has one array without a name.
     None,

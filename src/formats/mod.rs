@@ -73,7 +73,7 @@ static FORMATS: [&Format; 16] = [
 static COEFFICIENTS: Format =
     Format::new("coefficient file", &["wspl"], Reader::Nothing("is a coefficient file already, not frames to convert"));
 
-/// Extensions of inputs that say themselves what they are.
+/// Extensions of inputs with headers.
 #[doc(hidden)]
 pub fn extensions() -> impl Iterator<Item = &'static str> {
     let inputs = FORMATS.iter().filter(|format| !format.is(&COEFFICIENTS));

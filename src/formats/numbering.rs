@@ -19,7 +19,7 @@ pub(crate) fn check(paths: &[PathBuf]) -> Result<()> {
     }
 }
 
-/// As [`check`], of steps of a variable of a file; `what` they are is said in messages.
+/// As [`check`], for the steps of a variable of a file; `what` names them in messages.
 pub(crate) fn check_steps(file: &Path, variable: &str, what: &str, steps: &[u64]) -> Result<()> {
     let names: Vec<PathBuf> = steps.iter().map(|step| format!("{what} {step}").into()).collect();
     let refused = |e: Error| Error::input(file, Note { text: format!("{variable}: {e}"), remedy: e.remedy() });

@@ -1,4 +1,4 @@
-//! What the tests of the formats share: files, and what opening them gives.
+//! Helpers for the tests of the formats: files, and checks of opening them.
 
 pub(crate) use crate::source::testing::{DIMS, check_source, check_window, message, payload, value};
 
@@ -45,7 +45,7 @@ pub(crate) fn refused(inputs: &[PathBuf], options: &OpenOptions, words: &str) {
     assert!(message.contains(words), "{words:?} is not in {message:?}");
 }
 
-/// Opens and reads a file with every one of its bytes changed in turn: whatever it says, nothing may panic.
+/// Opens and reads a file with each of its bytes changed in turn: nothing may panic.
 pub(crate) fn survives_damage(name: &str, good: &[u8]) {
     survives_damage_in(0..good.len(), name, good);
 }

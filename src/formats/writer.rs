@@ -16,7 +16,7 @@ pub(crate) struct Writer {
     pub(crate) name: &'static str,
     /// Its place among the names in messages.
     pub(crate) place: usize,
-    /// What notes call the format; none if it stores all that there is.
+    /// The format's name in notes; `None` if it stores everything.
     pub(crate) label: Option<&'static str>,
     pub(crate) files: OutputFiles,
     pub(crate) axes: Axes,
@@ -30,9 +30,9 @@ pub(crate) struct Writer {
     pub(crate) has_coordinates: bool,
     /// Whether the whole file is in gzip.
     pub(crate) gzip: bool,
-    /// Writes what comes before the samples of a file.
+    /// Writes the header before the samples of a file.
     pub(crate) before: fn(&Contents, Samples, &mut dyn Write) -> io::Result<()>,
-    /// What comes after them.
+    /// The bytes after the samples.
     pub(crate) after: fn(&Contents, Samples) -> Vec<u8>,
 }
 
@@ -73,7 +73,7 @@ pub(crate) trait SampleSink: fmt::Debug {
     /// Writes the next samples, given little-endian.
     fn write(&mut self, samples: &[u8]) -> Result<()>;
 
-    /// Completes what is written.
+    /// Completes the output.
     fn finish(self: Box<Self>) -> Result<()>;
 }
 
@@ -164,7 +164,7 @@ impl SampleFormat {
         }
     }
 
-    /// Notes for the user on what the format cannot store exactly as it was.
+    /// Notes for the user on what the format cannot store exactly.
     pub fn notes(self, contents: &Contents) -> Vec<String> {
         let Writer { label: Some(name), has_times, has_coordinates, .. } = self.0 else { return Vec::new() };
         let Encoding { from, to, .. } = self.encoding(contents);

@@ -24,7 +24,7 @@ use crate::base::output::Output;
 use crate::base::report::report_text;
 use crate::file::shard::ShardPlace;
 use crate::file::{CoefficientFile, setting};
-use crate::render::parts::{Look, PartFile, PartWriter, Source, Total, is_part};
+use crate::render::partial::{PartialFile, PartialSource, PartialTotal, PartialWriter, PictureSetup, is_partial};
 use crate::render::sink::Provenance;
 use crate::render::{Limit, PartialSums, RenderConfig, RenderReport, SplatSource, render_sums};
 use serde::Serialize;
@@ -32,7 +32,7 @@ use std::path::PathBuf;
 
 /// The report of `--json` about a part.
 #[derive(Serialize)]
-struct PartReport<'a> {
+struct PartialReport<'a> {
     #[serde(flatten)]
     report: &'a RenderReport,
     /// The voxels of the part: the first, and the end (exclusive), along x, y, z.
@@ -61,38 +61,38 @@ struct Summed {
 }
 
 impl Summed {
-    fn new(total: &Total) -> Self {
+    fn new(total: &PartialTotal) -> Self {
         Self { parts: total.parts(), covered: total.covered() }
     }
 }
 
 /// A part before its first sums.
 struct Planned {
-    look: Look,
-    source: Source,
+    setup: PictureSetup,
+    source: PartialSource,
     /// The settings, with frames as the file numbers them.
     config: RenderConfig,
-    /// The numbers of the views in `config`, as the look has them.
+    /// The numbers of the views in `config`, as the setup has them.
     views: Vec<usize>,
     voxels: Region,
 }
 
-/// Sets what the first of some partial sums says of their pictures.
+/// Takes the settings of the pictures from the first of some partial sums.
 pub(super) fn imply_setup(request: &PictureRequest, inputs: &[PathBuf], memory: usize) -> Result<PictureRequest> {
     let Some(first) = inputs.first() else { return Ok(request.clone()) };
-    let look = PartFile::open(first, memory)?.head.look;
+    let setup = PartialFile::open(first, memory)?.head.look;
     let mut request = request.clone();
-    request.size.0 = look.views[0].size;
-    request.tolerance = look.tolerance.map(|(share, _)| share);
-    request.method = if look.direct { SplatSource::Samples } else { SplatSource::Coefficients };
-    request.quantity = look.quantity;
+    request.size.0 = setup.views[0].size;
+    request.tolerance = setup.tolerance.map(|(share, _)| share);
+    request.method = if setup.direct { SplatSource::Samples } else { SplatSource::Coefficients };
+    request.quantity = setup.quantity;
     Ok(request)
 }
 
 /// The file of a partial sum that is to be written.
 fn partial_output(request: &PictureRequest, inputs: &[PathBuf]) -> Result<Output> {
     spare_inputs(inputs, &request.output)?;
-    Output::create(&request.output, request.force || is_part(&request.output))
+    Output::create(&request.output, request.force || is_partial(&request.output))
 }
 
 /// Writes a partial sum.
@@ -103,11 +103,11 @@ pub(super) fn write_partial(session: &Session, request: &PictureRequest, reporte
     let Some(file) = opened.file.clone() else {
         return Err(Error::setting("partial", "takes a coefficient file, not frames; convert them first"));
     };
-    let Planned { look, source, config, views, voxels } = plan_partial(request, &opened, &file, session.memory)?;
+    let Planned { setup, source, config, views, voxels } = plan_partial(request, &opened, &file, session.memory)?;
     let first = source.frames[0];
     let frames: Vec<usize> = config.frames.iter().map(|frame| frame + first).collect();
-    let output = (request.output.as_path(), partial_output(request, session.paths())?);
-    let mut writer = PartWriter::new(output, look, (vec![voxels], vec![source]))?;
+    let output = partial_output(request, session.paths())?;
+    let mut writer = PartialWriter::new(&request.output, output, setup, vec![voxels], vec![source])?;
     let (progress, mut scene) = (reporter.progress("render", unit(&config.mode)), opened.scene);
     let report = match frames.is_empty() {
         true => {
@@ -124,8 +124,8 @@ pub(super) fn write_partial(session: &Session, request: &PictureRequest, reporte
     reporter.detail(format_args!("{}", summary(&report)));
     reporter.detail_read(file.bytes_read(), file.bytes());
     let (file_bytes_read, file_bytes) = (file.bytes_read(), file.bytes());
-    let of_part = PartReport { report: &report, voxels, frame_numbers: &frames, file_bytes_read, file_bytes };
-    Ok(Outcome { report: report_text(&of_part)?, is_on_stdout: false, end: skipped })
+    let report = PartialReport { report: &report, voxels, frame_numbers: &frames, file_bytes_read, file_bytes };
+    Ok(Outcome { report: report_text(&report)?, is_on_stdout: false, end: skipped })
 }
 
 /// An error if the pictures are not sums.
@@ -151,17 +151,17 @@ fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
 fn plan_partial(request: &PictureRequest, opened: &Opened, file: &CoefficientFile, memory: usize) -> Result<Planned> {
     let (standing, scene) = (ShardPlace::from_file(file)?, opened.scene.as_ref());
     let mut config = render_config(request, scene, Some(file), None, standing.all, memory)?;
-    let look = shared_setup(request, opened, file, &config, &standing);
+    let setup = shared_setup(request, opened, file, &config, &standing);
     let frames = [standing.frames.start, standing.frames.end];
-    let source = Source { file: file.id().to_string(), frames, times: file.metadata().times.clone() };
+    let source = PartialSource { file: file.id().to_string(), frames, times: file.metadata().times.clone() };
     let voxels = config.region.unwrap_or(scene.grid().whole());
     let held = |frame: &usize| standing.frames.contains(frame);
-    let of_view = |view: &usize| !config.paired || held(&config.frames[*view]);
-    let views: Vec<usize> = (0..config.views.len()).filter(of_view).collect();
+    let is_held = |view: &usize| !config.paired || held(&config.frames[*view]);
+    let views: Vec<usize> = (0..config.views.len()).filter(is_held).collect();
     config.views = views.iter().map(|view| config.views[*view]).collect();
     config.frames.retain(held);
     config.frames.iter_mut().for_each(|frame| *frame -= frames[0]);
-    Ok(Planned { look, source, config, views, voxels })
+    Ok(Planned { setup, source, config, views, voxels })
 }
 
 /// The settings that all parts of a picture share.
@@ -171,9 +171,9 @@ fn shared_setup(
     file: &CoefficientFile,
     config: &RenderConfig,
     standing: &ShardPlace,
-) -> Look {
+) -> PictureSetup {
     let (scene, m) = (opened.scene.as_ref(), file.metadata());
-    Look {
+    PictureSetup {
         archive: standing.archive.clone(),
         frames: standing.all,
         channels: scene.channels(),
@@ -200,9 +200,9 @@ fn shared_setup(
 /// Adds partial sums: to pictures, or to one partial sum.
 pub(super) fn add_partials(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Outcome> {
     let progress = reporter.progress("parts", "parts");
-    let total = Total::open(session.paths(), session.memory, progress.as_ref())?;
+    let total = PartialTotal::open(session.paths(), session.memory, progress.as_ref())?;
     let frames = match request.frames {
-        Some(_) => frames_of(request, total.look().frames)?,
+        Some(_) => frames_of(request, total.setup().frames)?,
         None => total.frames(),
     };
     note_gaps(request, &total, reporter);
@@ -214,14 +214,14 @@ pub(super) fn add_partials(session: &Session, request: &PictureRequest, reporter
 }
 
 /// Notes which voxels and frames the parts lack.
-fn note_gaps(request: &PictureRequest, total: &Total, reporter: &dyn Reporter) {
+fn note_gaps(request: &PictureRequest, total: &PartialTotal, reporter: &dyn Reporter) {
     if !total.is_whole() {
         let percent = 100.0 * total.covered();
         reporter.note(format_args!("the parts have {percent:.3} % of the voxels; pictures show these alone"));
     }
     let mut next = 0;
-    let ends = [total.look().frames; 2];
-    for [first, behind] in total.sources().iter().map(|of| of.frames).chain([ends]) {
+    let ends = [total.setup().frames; 2];
+    for [first, behind] in total.sources().iter().map(|source| source.frames).chain([ends]) {
         if next < first && request.frames.is_none() {
             reporter.note(format_args!("no part was made of the frames {next}:{first}"));
         }
@@ -234,7 +234,7 @@ struct Sum<'a> {
     session: &'a Session,
     request: &'a PictureRequest,
     reporter: &'a dyn Reporter,
-    total: &'a Total,
+    total: &'a PartialTotal,
     frames: &'a [usize],
 }
 
@@ -242,8 +242,8 @@ impl Sum<'_> {
     /// Writes one partial sum. Returns its report.
     fn write_partial(&self) -> Result<String> {
         let progress = self.reporter.progress("sum", "pictures");
-        let output = (self.request.output.as_path(), partial_output(self.request, self.session.paths())?);
-        self.total.join(self.frames, output, progress.as_ref())?.commit()?;
+        let output = partial_output(self.request, self.session.paths())?;
+        self.total.join(self.frames, &self.request.output, output, progress.as_ref())?.commit()?;
         report_text(&Summed::new(self.total))
     }
 
@@ -254,21 +254,21 @@ impl Sum<'_> {
         let config = total.config(self.frames, self.session.memory)?;
         let targets = AllTargets::new(request, self.session.paths(), &config)?;
         self.check_memory(&targets, &config)?;
-        let look = total.look();
+        let setup = total.setup();
         let input = ColouringInput {
             request,
-            channels: look.channels,
+            channels: setup.channels,
             config: &config,
             pictures: &targets.pictures,
             errors: None,
             colours: None,
         };
-        let ranges = |needed: Needed| if needed.of_pictures { self.ranges() } else { Ok(Ranges::default()) };
+        let ranges = |needed: Needed| if needed.pictures { self.ranges() } else { Ok(Ranges::default()) };
         let colouring = input.colouring(ranges, reporter)?;
-        let mut annotation = annotation(request, look.values.clone(), total.time_labels());
-        let provenance = provenance(request, &look.grid, &config, None, &annotation.times, &colouring);
+        let mut annotation = annotation(request, setup.values.clone(), total.time_labels());
+        let provenance = provenance(request, &setup.grid, &config, None, &annotation.times, &colouring);
         let provenance = with_parts(provenance, total);
-        annotation.axes = Some(axes_of_region(look.axes.clone(), &look.whole, whole_voxels(total), &config));
+        annotation.axes = Some(axes_of_region(setup.axes.clone(), &setup.whole, whole_voxels(total), &config));
         note_scale(&annotation, reporter);
         note_title(request, &annotation, &config, reporter);
         let (targets, annotation) = (&targets, &annotation);
@@ -289,8 +289,8 @@ impl Sum<'_> {
     }
 
     fn check_memory(&self, targets: &AllTargets, config: &RenderConfig) -> Result<()> {
-        let of_targets = targets.pictures.memory(self.request.depth, config)?;
-        let needed = self.total.least_memory().saturating_add(of_targets);
+        let for_targets = targets.pictures.memory(self.request.depth, config)?;
+        let needed = self.total.least_memory().saturating_add(for_targets);
         if needed <= self.session.memory {
             return Ok(());
         }
@@ -301,7 +301,7 @@ impl Sum<'_> {
     /// The ranges of the pictures of a few frames.
     fn ranges(&self) -> Result<Ranges> {
         let progress = self.reporter.progress("range", "pictures");
-        Ranges::of_pictures(self.frames, |some, give| {
+        Ranges::from_pictures(self.frames, |some, give| {
             self.total.render(some, progress.as_ref(), &mut |rendered| {
                 give(rendered.picture);
                 Ok(())
@@ -322,19 +322,19 @@ fn numbered<'a>(sums: PartialSums<'a>, views: &[usize], first: usize) -> Partial
 }
 
 /// The voxels of a sum, on the lattice of all voxels.
-fn whole_voxels(total: &Total) -> Region {
-    let (look, Region { start, end }) = (total.look(), total.bounds());
-    let step = 1 << look.lod;
-    let last = |axis: usize| (end[axis] * step).min(look.whole.dims[axis]);
+fn whole_voxels(total: &PartialTotal) -> Region {
+    let (setup, Region { start, end }) = (total.setup(), total.bounds());
+    let step = 1 << setup.lod;
+    let last = |axis: usize| (end[axis] * step).min(setup.whole.dims[axis]);
     Region { start: start.map(|n| n * step), end: [0, 1, 2].map(last) }
 }
 
 /// Adds the settings stored in the parts.
-fn with_parts(provenance: Provenance, total: &Total) -> Provenance {
-    let (look, sources) = (total.look(), total.sources());
+fn with_parts(provenance: Provenance, total: &PartialTotal) -> Provenance {
+    let (setup, sources) = (total.setup(), total.sources());
     Provenance {
-        lod: Some(look.lod).filter(|lod| *lod > 0),
-        exaggerate: Some(look.exaggeration).filter(|factor| *factor != 1.0),
+        lod: Some(setup.lod).filter(|lod| *lod > 0),
+        exaggerate: Some(setup.exaggeration).filter(|factor| *factor != 1.0),
         region: (!total.is_whole()).then(|| total.bounds().to_string()),
         sample_error: Some(total.sample_error()),
         file_id: (sources.len() == 1).then(|| sources[0].file.clone()),

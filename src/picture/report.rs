@@ -1,4 +1,4 @@
-//! What a run reports: notes, the sidecar and `--json`.
+//! The reports of a run: notes, the sidecar and `--json`.
 
 use super::plan::colouring::ColouredPictures;
 use super::plan::modes::mode_name;
@@ -27,7 +27,7 @@ pub(super) struct Reported<'a> {
     pub(super) file_bytes: Option<u64>,
 }
 
-/// What the progress of pictures counts.
+/// The unit of the progress of pictures.
 pub(super) fn unit(mode: &Mode) -> &'static str {
     match mode {
         Mode::Projection | Mode::Planes { .. } => "pictures",

@@ -4,7 +4,7 @@ use crate::base::error::Note;
 use crate::base::progress::Progress;
 use std::fmt::Arguments;
 
-/// What shows notes and progress: a terminal, or a program that waits for pictures.
+/// Shows notes and progress: a terminal, or a program that waits for pictures.
 pub trait Reporter {
     /// Shows something that users should know.
     fn note(&self, text: Arguments<'_>);

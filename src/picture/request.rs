@@ -1,4 +1,4 @@
-//! What a user asks of pictures.
+//! The request for pictures.
 
 use super::values::{
     ClearSpec, Detail, Exaggeration, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme, ViewAngles,

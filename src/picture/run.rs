@@ -10,7 +10,7 @@ use super::session::Session;
 use crate::base::error::Result;
 use crate::render::render;
 
-/// What a run leaves.
+/// The result of a run.
 pub struct Outcome {
     /// The report, as JSON.
     pub report: String,
@@ -20,7 +20,7 @@ pub struct Outcome {
     pub end: Result<()>,
 }
 
-/// Writes what is asked for.
+/// Writes what a request asks for.
 ///
 /// # Errors
 /// Those of opening, rendering and writing; [`Error::Usage`](crate::Error::Usage) names options of `wavesplat-render`.

@@ -1,4 +1,4 @@
-//! What pictures are made of, open for many of them.
+//! The inputs of pictures, kept open for many pictures.
 
 use super::plan::opened::FRAMES_HINT;
 use super::reporter::Reporter;
@@ -9,7 +9,7 @@ use crate::file::CoefficientFile;
 use crate::formats;
 use crate::remote::RemoteOptions;
 use crate::render::SplatSource;
-use crate::render::parts::is_part;
+use crate::render::partial::is_partial;
 use crate::source::{FrameSource, OpenOptions};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -150,7 +150,7 @@ fn kept(
 
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {
-    if is_part(path) {
+    if is_partial(path) {
         return Error::path(path, "is a part of a picture; `sum` makes pictures of parts");
     }
     let foreign = matches!(&error, Error::CoefficientFile { source: wavesplat_format::Error::Foreign(_), .. });

@@ -1,4 +1,4 @@
-//! A request of the viewer's page, which is trusted with nothing but numbers and known names.
+//! A request of the viewer's page. It may hold only numbers and known names, since the page is not trusted.
 
 use super::request::PictureRequest;
 use super::values::{AxisPosition, ClearSpec, Detail, ModeName, SliceSpec, SurfaceList, Theme, ViewAngles};
@@ -92,7 +92,7 @@ impl ViewRequest {
         request.check().map_or(Ok(request), |what| Err(Error::setting("request", what)))
     }
 
-    /// What is wrong with the request, if anything is.
+    /// The problem with the request, if there is one.
     fn check(&self) -> Option<String> {
         let places = self.iso.len().max(self.slices.len()).max(self.opacity.as_ref().map_or(0, Vec::len));
         let [first, end] = self.frames;
@@ -149,7 +149,7 @@ impl ViewRequest {
             ViewMode::Slice => request.mode = Some(ModeName::Slice),
         }
         if matches!(mode, ViewMode::Slice | ViewMode::Composite) {
-            request.slice = self.slices.iter().map(slice).collect();
+            request.slice = self.slices.iter().map(|(axis, share)| slice(*axis, *share)).collect();
         }
         if let Some(map) = &self.map {
             let colours = if colours_samples { &mut request.transfer_function } else { &mut request.colormap };
@@ -189,8 +189,8 @@ impl ViewRequest {
 }
 
 /// A slice at a share of an axis.
-fn slice((axis, share): &(Axis, f64)) -> SliceSpec {
-    SliceSpec { axis: axis.name().into(), position: AxisPosition::Share(*share) }
+fn slice(axis: Axis, share: f64) -> SliceSpec {
+    SliceSpec { axis: axis.name().into(), position: AxisPosition::Share(share) }
 }
 
 fn clear_spec(clear: &[f64]) -> ClearSpec {

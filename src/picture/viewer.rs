@@ -25,7 +25,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What a viewer shows: open inputs, and the settings that no request of the page changes.
+/// A viewer: open inputs, and the settings that no request of the page changes.
 #[derive(Debug)]
 pub struct ViewerSession {
     session: Session,

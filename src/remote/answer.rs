@@ -1,4 +1,4 @@
-//! What the answers of servers mean.
+//! Interprets the answers of servers.
 
 use crate::base::error::ChangedSince;
 use std::io;
@@ -7,7 +7,7 @@ use std::time::Duration;
 use ureq::http::HeaderMap;
 use ureq::http::header::{CONTENT_ENCODING, CONTENT_RANGE, ETAG, LAST_MODIFIED, RETRY_AFTER};
 
-/// What an answer says about an object.
+/// The facts about an object in an answer.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct About {
     /// Length in bytes.

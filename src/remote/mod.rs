@@ -34,7 +34,7 @@ use wavesplat_format::Storage;
 /// How remote files are read.
 #[derive(Debug, Clone)]
 pub struct RemoteOptions {
-    /// The folder that keeps what was read, for later runs.
+    /// The cache folder for later runs.
     pub cache: Option<Cache>,
     /// How long a server may be silent.
     pub timeout: Duration,

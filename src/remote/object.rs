@@ -1,4 +1,4 @@
-//! An object behind HTTP: requests for ranges, side by side, asked again where that may help.
+//! An object on an HTTP server: parallel requests for ranges, retried where that may help.
 
 use super::address::Address;
 use super::answer::{About, Failure, check};
@@ -201,7 +201,7 @@ fn spread() -> f64 {
     1.0 + RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64 / 2.0
 }
 
-/// What makes requests: connections that stay open, proxies from the environment, the certificates of the system.
+/// The HTTP client: connections that stay open, proxies from the environment, the certificates of the system.
 fn agent(address: &Address, timeout: Duration) -> Agent {
     let tls = TlsConfig::builder().root_certs(RootCerts::PlatformVerifier).build();
     let config = Agent::config_builder()

@@ -118,7 +118,7 @@ impl<S> Paged<S> {
 }
 
 impl<S: Storage> Paged<S> {
-    /// Keeps the first bytes of the storage, which were read already, as far as they are whole pages.
+    /// Keeps the whole pages among the first bytes of the storage, which were read already.
     #[cfg_attr(not(feature = "remote"), allow(dead_code, reason = "only objects of servers have this"))]
     pub(super) fn begun(self, first: &[u8]) -> Self {
         let pages = cut(&(0..first.len() as u64), first);

@@ -1,4 +1,4 @@
-//! Who reads from S3, and where: from the environment variables and files that other programs use for this.
+//! Credentials, region and endpoint of S3, from the environment variables and files that other programs use.
 
 use configparser::ini::Ini;
 use std::env;

@@ -25,7 +25,7 @@
 //! slices/           composites, isosurfaces and maximum intensity projections: the field along rays, slice by slice
 //! projection/       projections: weights, memory, bands of rows, planes to pixels; sums of a part of the voxels
 //! annotate/, sink/  text in pictures, and output files, with page/ for web pages; pictures: a rendering into files
-//! parts/            files of the sums of parts, and pictures of them
+//! partial/          files of partial sums, and pictures of their totals
 //! ```
 //!
 //! ```text
@@ -57,7 +57,7 @@ pub mod annotate;
 pub(crate) mod page;
 pub mod sink;
 mod pictures;
-pub mod parts;
+pub mod partial;
 
 pub use crate::wavelet::{LANES, Lane};
 pub use batches::{

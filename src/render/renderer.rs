@@ -1,4 +1,4 @@
-//! What a mode needs to render its pictures: the interface of all renderers.
+//! The interface of the renderers of all modes.
 
 use super::batches::Scene;
 use super::config::{RenderConfig, ViewTask};
@@ -24,7 +24,7 @@ pub(super) trait Renderer {
 /// Takes pictures.
 pub(super) type PictureSink<'a> = dyn FnMut(Rendered<'_>) -> Result<()> + 'a;
 
-/// Where the pictures of a rendering go, and what tells of it.
+/// The sink for the pictures of a rendering, and its progress.
 pub(super) struct Output<'a, 's> {
     pub(super) sink: &'a mut PictureSink<'s>,
     pub(super) report: &'a mut RenderReport,

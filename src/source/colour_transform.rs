@@ -16,14 +16,14 @@ use std::ops::Deref;
 /// The channels of a colour by their names, in the order in which they are stored.
 pub const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
-/// What makes samples into channels.
+/// The transform from samples to channels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColourTransform {
     /// The colours of values.
     pub colours: TransferFunction,
     /// The type of the samples that are coloured.
     pub sample: SampleType,
-    /// Stands for a missing sample among these.
+    /// The value of a missing sample among these.
     pub missing_value: Option<f64>,
 }
 
@@ -36,14 +36,14 @@ impl ColourTransform {
     pub(crate) const SETTINGS: [(&'static str, &'static str); 3] =
         [("colours", "transfer function"), ("dtype", "type of samples"), ("missing-value", "missing value")];
 
-    /// What a file remembers of it.
+    /// The settings that a file of colours stores.
     pub(crate) fn settings(&self) -> impl Iterator<Item = (&'static str, String)> {
         let Self { colours, sample, missing_value } = self;
         let values = [Some(colours.text()), Some(sample.to_string()), missing_value.map(|v| format!("{v:?}"))];
         Self::SETTINGS.into_iter().zip(values).filter_map(|((name, _), value)| Some((name, value?)))
     }
 
-    /// From [`Self::settings`], as they are found by their names; none if they are not all there, or no such settings.
+    /// From stored [settings](Self::settings), looked up by name; `None` if some are absent or invalid.
     pub(crate) fn of_settings<'a>(find: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
         let [colours, sample, missing] = Self::SETTINGS.map(|(name, _)| find(name));
         let missing_value = match missing {
@@ -66,7 +66,7 @@ impl ColourTransform {
         });
     }
 
-    /// One channel of the colour of a value; what is missing has none, whatever colour NaN may have.
+    /// One channel of the colour of a value. A missing value has no colour, whatever the map gives NaN.
     fn component(&self, channel: usize, value: f64) -> [u8; 4] {
         let missing = sample::is_missing(value, self.missing_value);
         let colour = if missing { None } else { self.colours.colour(value) };

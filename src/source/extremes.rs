@@ -31,7 +31,7 @@ impl Peak {
         }
     }
 
-    /// How often `value` is among values times `sign`, of which it is the largest.
+    /// The number of occurrences of `value`, the largest of the values times `sign`.
     fn count(values: &[f64], value: f64, sign: f64) -> Self {
         let (mut count, mut next) = (0, f64::NEG_INFINITY);
         for v in values {
@@ -47,7 +47,7 @@ impl Peak {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ExtremeCounts {
     most: Peak,
-    /// Of the values with the opposite sign.
+    /// The largest of the values with the opposite sign.
     least: Peak,
 }
 

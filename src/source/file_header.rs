@@ -42,7 +42,7 @@ impl Units {
 /// The content of the header of one input file.
 #[derive(Debug)]
 pub(crate) struct FileHeader {
-    /// What the file is, by name.
+    /// The name of the file's format.
     pub(crate) format: &'static str,
     /// Voxels and sample type of every frame.
     pub(crate) shape: Shape,
@@ -54,13 +54,13 @@ pub(crate) struct FileHeader {
     pub(crate) times: Vec<f64>,
     /// Name of the variable, if the file says so.
     pub(crate) variable: Option<String>,
-    /// What its numbers are measured in.
+    /// The units of its samples, times and places.
     pub(crate) units: Units,
-    /// What stands for missing samples, if the file says that some may be: NaN, or another value.
+    /// The value of missing samples, NaN or another, if the file declares one.
     pub(crate) missing: Option<f64>,
-    /// What the file says beside the samples.
+    /// The file's description.
     pub(crate) description: Option<Description>,
-    /// What a user should know about how the file is read.
+    /// Notes for the user on how the file is read.
     pub(crate) notes: Vec<Note>,
     /// Where the frames are.
     pub(crate) parts: Vec<Part>,
@@ -138,7 +138,7 @@ impl FileHeader {
 pub(crate) struct Mismatch {
     /// Its spacing or origin.
     pub(crate) grid: bool,
-    /// What its times are measured in, or since when, or by which calendar.
+    /// The unit, the reference date or the calendar of times.
     pub(crate) times: bool,
 }
 

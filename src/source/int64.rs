@@ -13,7 +13,7 @@ pub(crate) struct Unfit {
 }
 
 impl Unfit {
-    /// What is wrong with a sample at a voxel.
+    /// The message about the integer at a voxel.
     pub(crate) fn message(&self, [x, y, z]: [usize; 3], sample: SampleType) -> String {
         let value = self.value;
         format!("voxel ({x}, {y}, {z}) is {value}, which no {sample} sample is exactly: write the array as f32 or f64")

@@ -1,4 +1,4 @@
-//! What a frame is made of, and how the samples of some frames lie in an array: axes in any order and direction.
+//! The voxels of a frame, and how the samples of some frames lie in an array: axes in any order and direction.
 
 use super::Parsed;
 use crate::base::description::AxisRole;
@@ -51,7 +51,7 @@ impl std::fmt::Display for Shape {
 /// An axis of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Axis {
-    /// What it counts; single if that is neither frames nor voxels, but components, say.
+    /// Its role: an axis of frames or voxels, or one with a single chosen item, such as an axis of components.
     pub(crate) role: AxisRole,
     /// At least 1.
     pub(crate) len: usize,
@@ -67,7 +67,7 @@ impl Axis {
         Self { role, len, index: 0, backwards: false }
     }
 
-    /// An axis that counts neither frames nor voxels, of which one item is chosen.
+    /// An axis with one chosen item, which counts neither frames nor voxels.
     pub(crate) fn single(index: usize, len: usize) -> Self {
         Self { index, ..Self::new(AxisRole::Single, len) }
     }

@@ -45,7 +45,7 @@ pub(crate) type Parsed<T> = std::result::Result<T, String>;
 /// As [`Parsed`], with a remedy in the error.
 pub(crate) type Advised<T> = std::result::Result<T, Note>;
 
-/// What a header is read for, beside samples and times.
+/// What is read of a header, besides samples and times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Extent {
     /// Everything.
@@ -121,13 +121,13 @@ impl Default for OpenOptions {
 }
 
 impl OpenOptions {
-    /// Without what is for headerless data only.
+    /// Without the options for headerless data.
     pub(crate) fn for_headers(&self) -> Self {
         Self { dims: None, sample: None, big_endian: false, offset: 0, ..self.clone() }
     }
 }
 
-/// What an archive holds, known before any frame is read.
+/// The description of an archive, known before any frame is read.
 #[derive(Debug, Clone)]
 pub struct Archive {
     /// Name of the format.
@@ -148,11 +148,11 @@ pub struct Archive {
     pub units: Units,
     /// The value of missing samples, if the files declare one: NaN, or another value.
     pub missing: Option<f64>,
-    /// What the files say beside the samples, if they say more than the fields above.
+    /// The files' description, if it has more than the fields above.
     pub description: Option<Description>,
     /// Bytes of [`OpenOptions::memory`] that the source takes for a window.
     pub memory: usize,
-    /// What a user should know about how the files are read.
+    /// Notes for the user on how the files are read.
     pub notes: Vec<Note>,
 }
 
@@ -212,7 +212,7 @@ impl Archive {
 
 /// Frames in order, a window at a time.
 pub trait FrameSource: Send {
-    /// What the archive holds.
+    /// The description of the archive.
     fn archive(&self) -> &Archive;
 
     /// The `count` frames from `first`; fewer only if a stream ends there, then possibly none.
@@ -275,6 +275,6 @@ pub trait FrameWindow: Send + Sync {
     /// The name of a frame for messages: its file, and its place there.
     fn name(&self, frame: usize) -> String;
 
-    /// An error if a file of the window is no longer what it was when opened.
+    /// An error if a file of the window has changed since it was opened.
     fn check_unchanged(&self) -> Result<()>;
 }

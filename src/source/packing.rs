@@ -16,7 +16,7 @@ pub(crate) struct Packing {
 }
 
 impl Packing {
-    /// Numbers as they are.
+    /// Numbers that are samples without scaling.
     pub(crate) const NONE: Self =
         Self { scale: 1.0, offset: 0.0, missing: Vec::new(), valid: (f64::NEG_INFINITY, f64::INFINITY) };
 

@@ -1,4 +1,4 @@
-//! Where the frames of a file are: in the file as they are, or to be decoded first.
+//! Where the frames of a file are: stored uncompressed, or to be decoded first.
 
 use super::Parsed;
 use super::layout::{Layout, Strides};
@@ -42,7 +42,7 @@ pub(crate) struct Stored {
 }
 
 impl Stored {
-    /// Samples in the order of an array, as they are.
+    /// Samples in the order of an array, not packed.
     pub(crate) fn new(layout: &Layout, ty: impl Into<StoredType>, big_endian: bool) -> Parsed<Self> {
         let ty = ty.into();
         let (strides, bytes) = (layout.strides(ty.size())?, layout.bytes(ty.size())?);
@@ -58,7 +58,7 @@ impl Stored {
 /// Where the bytes of a part are.
 #[derive(Debug)]
 pub(crate) enum DataLocation {
-    /// In the file as they are, from this byte.
+    /// Uncompressed in the file, from this byte.
     Byte(u64),
     /// In the file, but packed.
     Decoded(Box<dyn Decode>),

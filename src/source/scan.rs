@@ -9,7 +9,7 @@ use crate::source::{FrameSource, FrameWindow};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
-/// What was seen.
+/// The result of a scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scan {
     /// Range of the samples that are not missing; (inf, -inf) if all are.
@@ -18,7 +18,7 @@ pub(crate) struct Scan {
     pub(crate) extremes: ExtremeCounts,
     /// Missing samples.
     pub(crate) missing: u64,
-    /// The first of them: frame within the window, and index of the voxel within the frame.
+    /// The first missing sample: frame within the window, and index of the voxel within the frame.
     pub(crate) first_missing: Option<(usize, usize)>,
     /// A digest of all samples, the same for every way in which they can be stored.
     pub(crate) digest: u64,
@@ -33,7 +33,7 @@ impl Scan {
         digest: 0,
     };
 
-    /// What two consecutive stretches hold together.
+    /// The results of two consecutive runs as one.
     fn then(self, next: Self) -> Self {
         let mut digests = [0; 16];
         digests[..8].copy_from_slice(&self.digest.to_le_bytes());
@@ -81,7 +81,7 @@ pub fn value_range(
     Ok(Some(range).filter(|(lo, hi)| lo <= hi))
 }
 
-/// Looks at every sample of a frame, after what was `seen`; runs of rows in parallel, joined in order.
+/// Scans every sample of a frame, and adds the result to `seen`. Runs of rows are scanned in parallel and joined in order.
 pub(crate) fn scan_frame(
     seen: Scan,
     window: &dyn FrameWindow,

@@ -22,7 +22,7 @@ pub(crate) struct FrameFiles {
     pub(crate) paths: Vec<PathBuf>,
     /// Time of each where a list says so, else empty.
     pub(crate) times: Vec<f64>,
-    /// What a user should know about how they were found.
+    /// Notes for the user on how the files were found.
     pub(crate) notes: Vec<Note>,
 }
 

@@ -19,7 +19,7 @@ pub struct VariableInfo {
     pub components: usize,
     /// Arrays that follow one another in time.
     pub steps: usize,
-    /// What its samples are measured in, where the file says so.
+    /// The unit of its samples, if the file states it.
     pub unit: Option<String>,
 }
 

@@ -7,7 +7,7 @@ use crate::common::samples::{append, special};
 use crate::common::series::Mask;
 use crate::common::views::{SKEWED, field, rounding, truth, view};
 use crate::common::{Stored, extracted, looking, pictures, settings, stored, windows};
-use crate::images::bits;
+use crate::frame_pictures::bits;
 use std::path::Path;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;

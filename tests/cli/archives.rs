@@ -26,7 +26,7 @@ fn every_kind_of_archive_becomes_a_picture_by_two_commands() {
 
 #[test]
 #[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
-fn places_times_and_units_go_from_file_to_file() {
+fn positions_times_and_units_are_kept_from_file_to_file() {
     let work = Work::new();
     let told = |name: &str| {
         let told = work.wavesplat(&format!("info {name} --json")).ok().json();
@@ -79,7 +79,7 @@ fn ambiguous_variables_are_listed_and_chosen() {
 }
 
 #[test]
-fn info_lists_the_variables_of_which_one_must_be_chosen() {
+fn info_lists_the_variables_to_choose_from() {
     let work = Work::new();
     for (name, line) in [
         ("netcdf/several.nc", "  density: i8 (time 4, z 3, y 5, x 7) in kg m-3\n"),
@@ -165,7 +165,7 @@ fn an_estimate_finds_a_peak_within_a_window() {
 }
 
 #[test]
-fn a_coefficient_file_does_not_get_the_name_of_another_format() {
+fn a_coefficient_file_with_the_extension_of_another_format_is_refused() {
     let work = Work::with_file("");
     for name in ["b.nc", "b.NPY", "b.vti"] {
         work.wavesplat(&format!("convert a.npy -o {name}")).fails(2, &[name, "named .wspl", "extract"]);
@@ -175,7 +175,7 @@ fn a_coefficient_file_does_not_get_the_name_of_another_format() {
 }
 
 #[test]
-fn coefficients_go_through_a_pipe_as_they_are() {
+fn a_pipe_carries_a_coefficient_file_unchanged() {
     let work = Work::with_file("");
     work.shell("cat a.npy | $WAVESPLAT convert - -o - | cat > b.wspl").ok();
     assert!(work.read("a.wspl") == work.read("b.wspl"));

@@ -47,7 +47,7 @@ fn channels_are_extracted_by_name_and_keep_their_bound() {
 }
 
 #[test]
-fn info_and_verify_know_the_colours() {
+fn info_and_verify_report_the_colours() {
     let (work, archive) = with_file("");
     let info = work.wavesplat("info a.wspl").ok();
     assert!(
@@ -72,7 +72,7 @@ fn info_and_verify_know_the_colours() {
 }
 
 #[test]
-fn a_named_map_takes_the_range_of_all_frames_which_a_pipe_cannot_tell() {
+fn a_named_map_takes_the_range_of_all_frames_and_needs_one_for_a_pipe() {
     let (work, archive) = work();
     let range = archive.values.iter().fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
     work.wavesplat("convert a.npy -o a.wspl --transfer-function viridis").ok();
@@ -205,7 +205,7 @@ fn pictures_have_three_numbers_a_pixel_and_fixed_colours() {
 }
 
 #[test]
-fn options_without_a_use_for_colours_are_refused() {
+fn options_without_meaning_for_colours_are_refused() {
     let (work, _) = with_file("");
     let refused = |args: &str, words: &[&str]| {
         work.render(args).fails(2, words);

@@ -40,7 +40,7 @@ fn a_config_file_equals_the_command_line() {
 }
 
 #[test]
-fn the_command_line_wins() {
+fn the_command_line_overrides_the_config_file() {
     let work = work(CONFIG);
     let run = work.wavesplat("convert a.npy --config run.toml -o c.wspl --window 4 --basis multi -v --tolerance=0.01");
     run.fails(2, &["--window", "not 4", "multi", "options from run.toml:", "frames"]);
@@ -57,7 +57,7 @@ fn the_command_line_wins() {
 }
 
 #[test]
-fn a_variable_of_each_program_names_a_file() {
+fn an_environment_variable_of_each_program_names_a_config_file() {
     let work = work("tolerance = 0\n");
     work.write("pictures.toml", "size = \"20x10\"\n");
     work.shell("WAVESPLAT_CONFIG=run.toml $WAVESPLAT convert a.npy -o a.wspl").ok();

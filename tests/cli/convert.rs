@@ -62,7 +62,7 @@ fn a_pipe_that_spools_to_disk_gives_the_same_file() {
 }
 
 #[test]
-fn the_memory_that_is_asked_for_is_enough() {
+fn the_memory_that_a_message_requests_is_enough() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     for options in ["", "--block 8", "--window 64 --block 16", "--threads 4"] {
@@ -99,7 +99,7 @@ fn threads_change_no_byte_and_no_pixel() {
 }
 
 #[test]
-fn settings_are_in_the_bytes_and_chance_is_not() {
+fn bytes_depend_on_settings_and_not_on_chance() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     work.write("elsewhere/b.npy", small().npy());

@@ -1,7 +1,7 @@
 //! Programs killed at any time: only the right content under final names, and the same bytes in the end.
 #![cfg(unix)]
 
-use super::job::{FILE, Job};
+use super::disturbed_job::{FILE, Job};
 use super::{Archive, Run};
 use crate::common::random::Random;
 use crate::common::{report, times};

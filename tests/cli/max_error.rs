@@ -66,7 +66,7 @@ fn pictures_take_shares_of_the_decoded_values() {
 }
 
 #[test]
-fn the_options_that_a_file_names_make_it_again() {
+fn remembered_options_reproduce_a_file() {
     let work = work();
     let info = work.wavesplat("info a.wspl --json").ok().json();
     let options = info["options"].as_object().unwrap();
@@ -82,7 +82,7 @@ fn the_options_that_a_file_names_make_it_again() {
 }
 
 #[test]
-fn errors_are_given_by_name() {
+fn errors_can_be_given_for_each_variable_by_name() {
     let work = work();
     work.wavesplat("convert a.npy -o b.wspl --max-error a=0.1").fails(2, &["--max-error", "given for a", "no name"]);
     let inputs = format!("{}/tests/golden/inputs", env!("CARGO_MANIFEST_DIR"));

@@ -1,50 +1,50 @@
 //! The programs from the outside: arguments, files, pipes, messages and exit codes.
 
-mod again;
-mod along;
-mod archives;
-mod ceilings;
-mod channels;
-mod colours;
-mod config;
-mod convert;
-mod crowd;
-mod damage;
-mod errors;
-mod extract;
-mod faults;
-mod formats_out;
-mod generated;
-mod guide;
-mod help;
-mod identical;
-mod interrupted;
-mod job;
-mod killed;
-mod manners;
-mod max_error;
-mod memory;
-mod modes;
-mod motion;
-mod movies;
-mod mutated;
-mod parts;
-mod pictures;
-mod pipes;
-mod probe;
-mod progress;
-mod recover;
+mod archives; // archives of other programs are converted, shown and described
+mod argument_messages; // messages about arguments say what to do next
+mod bound_reports; // how `convert`, `info` and `verify` report each error bound
+mod changed_while_read; // inputs that change while they are read
+mod channels; // files of colours: reports, refusals, resuming
+mod colours_and_annotations; // colour maps, ranges, annotations, sheets, moving PNGs
+mod completions_and_man_pages; // shell completions and man pages
+mod composite_and_mip; // pictures along rays
+mod concurrent_writers; // several programs write one file at once
+mod config; // options from a config file
+mod conversion_warnings; // warnings of conversions, and refused fill values
+mod convert; // every kind of input gives the same file
+mod damaged_files; // damaged coefficient files are refused
+mod depth_and_provenance; // 16 bits per channel, OpenEXR, and what made a picture
+mod disturbed_job; // helper: a command that is disturbed and completed
+mod extract_and_verify; // `info`, `verify` and `extract`
+mod failing_files; // inputs and outputs that fail
+mod formats_out; // extracted samples in the formats of other programs
+mod guide; // README and the guide: commands run, links lead somewhere
+mod help; // help texts
+mod interrupted; // Ctrl-C and SIGTERM
+mod invalid_options; // invalid requests are named
+mod io_faults; // a fault at every operation on files
+mod irregular_streams; // slow and odd producers behind a pipe
+mod killed; // kill -9 at any time
+mod max_error; // errors in the samples' unit
+mod memory; // memory stays within the budget
+mod metadata_round_trip; // metadata as the field's own software reads them
+mod movies; // movies by ffmpeg
+mod moving_cameras; // cameras that move while time passes
+mod partial_sums; // partial sums of pictures, and their total
+mod pipes; // pipes that end early, late or never
+mod probe; // time series of points and regions
+mod progress; // progress as JSON
+mod recover; // recovery of damaged files
+mod remembered_options; // options that a file remembers
 #[cfg(feature = "remote")]
-mod remote;
-pub(crate) mod render;
-mod resume;
-mod several;
-mod shards;
-mod slices;
-mod streams;
-mod times;
-mod usage;
-mod warned;
+mod remote; // files on servers
+pub(crate) mod render; // pictures in every format
+mod resume_and_append; // resumed runs and appended frames
+mod several_variables; // several variables, and magnitudes of vectors
+mod shards; // shards and merging
+mod slices; // slices through the volume
+mod system_limits; // limits of the system on memory and on the size of files
+mod times; // times, dates and calendars
 
 use std::ffi::OsStr;
 use std::fs;

@@ -43,7 +43,7 @@ fn movies_show_the_pictures() {
 }
 
 #[test]
-fn movies_of_our_own_are_replaced_and_others_are_not() {
+fn only_movies_of_this_program_are_replaced() {
     if !has_ffmpeg() {
         return;
     }

@@ -77,7 +77,7 @@ fn a_chart_has_lines_bands_and_a_legend() {
 }
 
 #[test]
-fn odd_probes_are_refused() {
+fn invalid_probes_are_refused() {
     let work = Work::with_file("");
     work.wavesplat("convert a.npy -o c.wspl --transfer-function turbo").ok();
     for (args, words) in [

@@ -116,7 +116,7 @@ fn several_programs_share_a_cache() {
 }
 
 #[test]
-fn passing_faults_are_outlived() {
+fn passing_faults_are_retried() {
     let work = work();
     work.wavesplat("extract run.wspl -o right.npy").ok();
     let busy = || Fate::Refuse(503, "Retry-After: 0\r\n".into(), String::new());
@@ -220,7 +220,7 @@ fn passwords_and_signatures_are_not_shown() {
 }
 
 #[test]
-fn objects_of_s3_are_asked_for_with_a_signature() {
+fn requests_to_s3_are_signed() {
     let (work, server) = (work(), Server::of(bytes().clone()));
     let endpoint = format!("export NO_PROXY=127.0.0.1 HOME=/ AWS_ENDPOINT_URL=http://127.0.0.1:{};", server.port());
     let keys = "AWS_ACCESS_KEY_ID=KEY AWS_SECRET_ACCESS_KEY=secret AWS_REGION=eu-west-3";
@@ -253,7 +253,7 @@ fn an_unencrypted_answer_is_not_taken_for_an_encrypted_one() {
 }
 
 #[test]
-fn what_is_not_done_on_servers_is_said() {
+fn commands_that_need_local_files_say_so() {
     let work = work();
     for (line, words) in [
         ("convert https://127.0.0.1:9/a.npy -o a.wspl", vec!["frames are not read from servers"]),

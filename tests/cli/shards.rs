@@ -1,4 +1,4 @@
-//! Shards of an archive give the bytes of one conversion, and merging refuses what is not all of them.
+//! Merged shards are the bytes of one conversion; incomplete or foreign shards are refused.
 
 use super::{Archive, Work};
 
@@ -65,7 +65,7 @@ fn scans_of_shards_are_the_scan_of_all_frames() {
 }
 
 #[test]
-fn what_is_not_all_shards_of_one_archive_is_refused() {
+fn incomplete_or_foreign_shards_are_refused() {
     let work = work();
     let range = "--range -2,3";
     shards(&work, range, 3);
@@ -103,7 +103,7 @@ fn what_is_not_all_shards_of_one_archive_is_refused() {
 }
 
 #[test]
-fn damaged_shards_are_named_or_keep_what_is_whole() {
+fn damaged_shards_are_named_or_keep_their_intact_blocks() {
     let work = work();
     shards(&work, "--range -2,3 --block 8", 2);
     let mut bytes = work.read("part-2.wspl");
@@ -119,7 +119,7 @@ fn damaged_shards_are_named_or_keep_what_is_whole() {
 }
 
 #[test]
-fn a_merge_that_was_cut_short_goes_on() {
+fn an_interrupted_merge_is_resumed() {
     let work = work();
     shards(&work, "--range -2,3", 5);
     work.shell("$WAVESPLAT merge part-*.wspl -o whole.wspl").ok();
@@ -192,7 +192,7 @@ fn missing_shards_become_lost_windows_of_the_right_frames() {
 }
 
 #[test]
-fn a_merge_without_shards_goes_on() {
+fn a_merge_with_missing_shards_is_resumed() {
     let work = work();
     shards(&work, "--range -2,3", 5);
     let merge = "$WAVESPLAT merge part-[1245].wspl -o merged.wspl --skip-damaged";

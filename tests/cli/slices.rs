@@ -165,7 +165,7 @@ fn thin_and_constant_volumes_have_slices() {
 }
 
 #[test]
-fn odd_slices_are_refused() {
+fn invalid_slices_are_refused() {
     let work = Work::with_file("");
     for (args, words) in [
         ("--slice z", &["--slice", "AXIS=PLACE"][..]),

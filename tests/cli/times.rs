@@ -1,6 +1,6 @@
 //! Times: of files that count from different days, of the user, and as people read them.
 
-use super::again::part;
+use super::remembered_options::part;
 use super::{Work, small};
 use serde_json::json;
 
@@ -78,7 +78,7 @@ fn the_user_gives_times_to_files_and_to_streams() {
 }
 
 #[test]
-fn appended_frames_go_on_in_time() {
+fn appended_frames_continue_the_times() {
     let (work, archive) = (Work::new(), small());
     work.write("all.npy", archive.npy());
     for (name, first, end) in [("a", 0, 16), ("b", 16, 32), ("c", 32, 40)] {
@@ -116,7 +116,7 @@ fn a_conversion_is_not_resumed_with_other_times() {
 }
 
 #[test]
-fn times_that_cannot_be_are_refused() {
+fn impossible_times_are_refused() {
     let work = Work::new();
     work.write("a.npy", small().npy());
     work.write("few.txt", "1\n2\n");

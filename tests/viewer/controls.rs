@@ -1,7 +1,7 @@
 //! Controls of the page: colours, opacities, slices, keys and what is saved.
 
 use super::browser::Browser;
-use super::hands::{FULL, opened};
+use super::interaction::{FULL, opened};
 use super::{converted, converted_from};
 use crate::cli::Archive;
 use serde_json::{Value, json};
@@ -16,7 +16,7 @@ fn range(browser: &mut Browser) -> [f64; 2] {
 }
 
 #[test]
-fn ranges_may_pass_through_what_is_out_of_order() {
+fn a_range_out_of_order_waits_for_its_other_end() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);
@@ -77,7 +77,7 @@ fn diverging_colours_have_zero_in_their_middle() {
 }
 
 #[test]
-fn slices_take_the_range_of_their_places() {
+fn slices_take_the_range_of_their_position() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let ramp = Archive::of([16, 14, 12], 3, |x, y, z, _| (x * y) as f32 * 1e-3 + (z * z) as f32);
     let work = converted_from(&ramp, "");
@@ -96,7 +96,7 @@ fn slices_take_the_range_of_their_places() {
 }
 
 #[test]
-fn opacities_are_those_of_the_picture() {
+fn the_opacity_editor_shows_the_opacities_of_the_picture() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);
@@ -166,7 +166,7 @@ fn isosurfaces_begin_at_a_value_of_the_frame() {
 }
 
 #[test]
-fn keys_press_what_has_the_focus() {
+fn keys_act_on_the_focused_control() {
     let Some(mut browser) = Browser::start([900, 600]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);
@@ -190,7 +190,7 @@ fn keys_press_what_has_the_focus() {
 }
 
 #[test]
-fn messages_keep_the_picture_as_it_is() {
+fn long_messages_do_not_resize_the_picture() {
     let Some(mut browser) = Browser::start([390, 844]) else { return };
     let work = converted("");
     let _served = opened(&work, &mut browser);

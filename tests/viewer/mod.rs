@@ -1,13 +1,13 @@
 //! `wavesplat view` and pages of pictures, in a browser and from the outside.
 
-mod browser;
-mod controls;
-mod hands;
-mod pages;
-mod pixels;
-mod requests;
-mod served;
-mod turns;
+mod browser; // helper: a browser without a window
+mod controls; // controls of the page: colours, opacities, slices, keys, saving
+mod foreign_requests; // requests that no page of the viewer sends
+mod interaction; // dragging, the wheel, keys, sliders, playing
+mod pages; // pages that hold their pictures
+mod pixels_match_program; // pixels of the page are those of `wavesplat-render`
+mod request_priority; // which request is answered first
+mod running_viewer; // helper: a running `wavesplat view`
 
 use crate::cli::{Archive, Work};
 

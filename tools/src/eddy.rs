@@ -89,7 +89,7 @@ pub fn eddy_currents(plate: Plate, magnet: Magnet, frames: usize) -> impl Iterat
     })
 }
 
-/// The state of the field and what is needed to advance it.
+/// The state of the field, and the buffers for advancing it.
 struct Solver {
     lattice: Lattice,
     magnet: Magnet,

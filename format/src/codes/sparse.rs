@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// Where the codes of a box lie in the arrays of whoever decodes them: one array for each k of the box.
+/// Where the codes of a box lie in the decoder's arrays: one array for each k of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CodeBox {
     /// Codes along x, y, z, k.

@@ -166,7 +166,7 @@ pub struct Cli {
 }
 
 impl Cli {
-    /// What is asked for.
+    /// The request that the options make.
     pub(super) fn request(&self) -> PictureRequest {
         let request = PictureRequest {
             output: self.output.clone(),

@@ -13,11 +13,11 @@ use clap::Parser;
 pub use generate::Program;
 use std::ffi::OsString;
 
-/// What words after `wavesplat-render` stand for.
+/// The meaning of the words after `wavesplat-render`.
 pub struct Parsed {
     /// The inputs.
     pub session: Session,
-    /// What is asked for.
+    /// The request that the words make.
     pub request: PictureRequest,
     /// Words for how the inputs are opened.
     pub input_words: Vec<String>,

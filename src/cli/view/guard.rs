@@ -1,4 +1,4 @@
-//! Who may ask: only pages of this server, which know its token.
+//! Admits requests only from pages of this server, which know its token.
 
 use crate::base::error::{Error, Result};
 use axum::http::{HeaderMap, HeaderValue, header};

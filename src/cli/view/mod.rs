@@ -91,7 +91,7 @@ impl Viewer {
         self.server.run(self.listener, stop).map_err(|e| failed(&self.address, e))
     }
 
-    /// Answers requests on a thread of its own, until what is returned is dropped.
+    /// Answers requests on a separate thread, until the returned viewer is dropped.
     pub fn serve_aside(self) -> Serving {
         let stop = Stop::default();
         let own = stop.clone();

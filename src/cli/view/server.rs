@@ -66,7 +66,7 @@ impl Drop for Wait {
     }
 }
 
-/// What is wrong with a request, or with rendering it.
+/// The error of a request, or of rendering it.
 struct Failed(StatusCode, String);
 
 impl IntoResponse for Failed {

@@ -1,10 +1,10 @@
-//! What becomes of predicted nodes: codes are added to them (decoding), or computed from them (encoding).
+//! Corrections of predicted nodes: codes are added to them (decoding), or computed from them (encoding).
 
 use crate::codec::real::Real;
 use crate::codec::rows;
 use wavesplat_format::SparseCodes;
 
-/// What becomes of predicted nodes: codes are added, or computed.
+/// Corrects predicted nodes: adds codes, or computes them.
 pub(super) trait Correction<R> {
     /// Corrects consecutive nodes that a pass adds, from number `first` of them on.
     fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]);

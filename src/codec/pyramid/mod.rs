@@ -61,7 +61,7 @@ pub(crate) struct PredictionPasses<'a> {
     stages: Stages,
 }
 
-/// A box of codes, and what becomes of them.
+/// A box of codes, and the nodes that they become.
 #[derive(Debug)]
 struct PlacedBox {
     /// The pass that adds its nodes, and the selection of nodes; `None` if the level of detail has none of its nodes.

@@ -15,7 +15,7 @@ use crate::source::parts::Part;
 use crate::source::{Advised, Extent, OpenOptions, Parsed};
 use std::path::{Path, PathBuf};
 
-/// A file of arrays that was opened to see what it holds.
+/// An open file of arrays.
 pub(crate) struct ArrayArchive {
     format: &'static str,
     opener: Opener,
@@ -106,7 +106,7 @@ impl ArrayArchive {
     }
 }
 
-/// Takes the times beside arrays for the steps, if these have none.
+/// Uses the times stored beside the arrays, if the steps have no times of their own.
 fn take_times(described: &mut FileHeader, arrays: FileArrays<'_>, choice: &Choice<'_>) {
     let count = choice.arrays.len();
     if described.times.len() == count {

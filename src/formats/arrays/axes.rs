@@ -1,4 +1,4 @@
-//! Finds what the axes of a variable count: by the user's letters, the CF conventions, their names, or else their
+//! Finds the roles of a variable's axes: by the user's letters, the CF conventions, their names, or else their
 //! order.
 
 use super::Variable;
@@ -53,7 +53,7 @@ impl TimeHint {
     }
 }
 
-/// Finds what each axis counts, the slowest first, with notes on guesses. `index` is the chosen index of an axis other
+/// Finds the role of each axis, the slowest first, with notes on guesses. `index` is the chosen index of an axis other
 /// than space and time; `letters` is the user's choice.
 pub(crate) fn axes(
     variable: &Variable,

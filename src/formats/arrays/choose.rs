@@ -143,7 +143,7 @@ fn templated(path: &str) -> Option<(String, u64)> {
     Some((named.collect::<Vec<_>>().join("/"), step))
 }
 
-/// Names of variables that others name as their places.
+/// Names of variables that other variables name as their coordinates.
 fn bounds(all: &[Variable]) -> HashSet<&str> {
     let says = ["bounds", "climatology", "coordinates"];
     let texts = all.iter().flat_map(|v| says.into_iter().filter_map(|what| v.text(what)));

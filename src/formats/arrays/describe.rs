@@ -1,4 +1,4 @@
-//! What a file of arrays says beside the samples: dimensions, attributes, coordinates and other small arrays.
+//! The description in a file of arrays: dimensions, attributes, coordinates and other small arrays.
 
 use super::{ArrayFile, Variable};
 use crate::base::description::{
@@ -10,7 +10,7 @@ use crate::source::{Extent, Parsed};
 /// Bytes of an array that is kept whole.
 const MOST_BYTES: usize = 8 << 20;
 
-/// Bytes of all of them: less than a description may have, since it also has texts.
+/// Bytes of all these arrays: less than a description may have, since it also has texts.
 const MOST_BYTES_TOGETHER: usize = 14 << 20;
 
 /// Values of an array for each frame that are kept.
@@ -19,10 +19,10 @@ const MOST_PER_FRAME: usize = 64;
 /// Attributes that describe how samples are stored. They are not kept, because samples are decoded by them.
 const STORAGE: [&str; 4] = ["scale_factor", "add_offset", "_FillValue", "_Unsigned"];
 
-/// Attributes with stored numbers, which are others than the samples of packed arrays.
+/// Attributes in the units of stored numbers, which differ from the samples of packed arrays.
 const PACKED: [&str; 4] = ["valid_min", "valid_max", "valid_range", "missing_value"];
 
-/// The samples' array, and what is known of it.
+/// The samples' array, and its meaning.
 pub(crate) struct Samples<'a> {
     pub(crate) variable: &'a Variable,
     pub(crate) axes: &'a [Axis],

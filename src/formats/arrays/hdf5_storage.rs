@@ -1,4 +1,4 @@
-//! The bytes of a file for the crates that read HDF5, and what they say of a file that they cannot read.
+//! The bytes of a file for the crates that read HDF5, and messages about files that they cannot read.
 
 use crate::base::mapped::FileBytes;
 use hdf5_reader::error::Error as Hdf5Error;

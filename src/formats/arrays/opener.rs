@@ -19,7 +19,7 @@ pub(crate) struct ReadConfig {
     pub(crate) memory: usize,
 }
 
-/// Opens a file of one format, or what the caller holds.
+/// Opens a file of one format, or the caller's arrays.
 pub(crate) type OpenFile = Arc<dyn Fn(&Path, ReadConfig) -> Result<Box<dyn ArrayFile>> + Send + Sync>;
 
 /// Opens a file of arrays, any number of times.
@@ -28,7 +28,7 @@ pub(crate) struct Opener {
     pub(crate) path: PathBuf,
     pub(crate) how: ReadConfig,
     pub(crate) open: OpenFile,
-    /// The file, while frames are taken of any of its arrays.
+    /// The file, open while frames of any of its arrays are read.
     pub(crate) opened: Arc<Mutex<Option<Box<dyn ArrayFile>>>>,
 }
 

@@ -4,7 +4,7 @@ use super::choose::{Choice, STEP};
 use super::variable::numbers;
 use super::{ArrayFile, Attribute, Attributes, Variable};
 
-/// What a mesh says of its lattice, in the order of the array's axes.
+/// The lattice of a mesh, in the order of the array's axes.
 pub(crate) struct Mesh {
     labels: Vec<String>,
     spacing: Vec<f64>,
@@ -55,7 +55,7 @@ impl Mesh {
     }
 }
 
-/// The time of each step and whether these are seconds, where the groups of all say it.
+/// The time of each step, and whether times are in seconds, if the groups of all steps state it.
 pub(crate) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Option<(Vec<f64>, bool)> {
     let (before, _) = choice.path.split_once(STEP)?;
     let group = |variable: &&Variable| {

@@ -11,7 +11,7 @@ use crate::source::packing::Packing;
 pub(crate) struct Values {
     pub(crate) sample: SampleType,
     pub(crate) packing: Option<Packing>,
-    /// What stands for missing samples, if some may be.
+    /// The value of missing samples, if some may be missing.
     pub(crate) missing: Option<f64>,
     pub(crate) unit: Option<String>,
 }
@@ -52,7 +52,7 @@ impl Values {
     }
 }
 
-/// A number as it is among the stored ones: attributes may be of another type.
+/// An attribute's number in the type of the stored numbers, which may differ from its own.
 fn as_stored(stored: SampleType, value: f64) -> f64 {
     if stored.is_float() { sample::round_to(stored, value) } else { value }
 }

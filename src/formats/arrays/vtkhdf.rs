@@ -1,10 +1,10 @@
-//! Images in VTKHDF: arrays of an HDF5 file whose axes, lattice and steps are said by VTK's conventions.
+//! Images in VTKHDF: arrays of an HDF5 file with axes, lattice and steps by VTK's conventions.
 
 use super::{ArrayFile, Attribute, Variable};
 use crate::formats::shared::association::Association;
 use crate::source::Parsed;
 
-/// What such a file says of its arrays.
+/// The arrays of such a file, and their lattice.
 pub(crate) struct Image {
     /// Those of points and of cells, by axes with names.
     pub(crate) variables: Vec<Variable>,
@@ -21,7 +21,7 @@ pub(crate) struct Image {
 const ROOT: &str = "/VTKHDF";
 
 impl Image {
-    /// What the file says; none if it is no VTKHDF.
+    /// The file's arrays and lattice; `None` if the file is no VTKHDF.
     pub(crate) fn read(file: &dyn ArrayFile, all: &[Variable]) -> Parsed<Option<Self>> {
         let attributes = file.group(ROOT);
         let Some(Attribute::Text(kind)) = attributes.get("Type") else { return Ok(None) };
@@ -89,7 +89,7 @@ impl Image {
     }
 }
 
-/// What an array has samples of: `PointData` or `CellData`.
+/// Whether an array has samples of points or of cells: `PointData` or `CellData`.
 fn data(variable: &Variable) -> Option<&str> {
     let (data, name) = variable.path.strip_prefix(ROOT)?.strip_prefix('/')?.split_once('/')?;
     Some(data).filter(|data| matches!(*data, "PointData" | "CellData") && name != "vtkGhostType")

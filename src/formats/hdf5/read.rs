@@ -22,7 +22,7 @@ use std::sync::Arc;
 const MOST_DEPTH: usize = 16;
 const MOST_OBJECTS: usize = 100_000;
 
-/// Opens a file to see what it holds. One that the NetCDF library wrote is a NetCDF file.
+/// Opens a file and lists its arrays. A file that the NetCDF library wrote counts as NetCDF.
 pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let archive = ArrayArchive::open("HDF5", path, Some(path), Arc::new(open_file), options)?;
     match archive.is_of_netcdf() {

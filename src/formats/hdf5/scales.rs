@@ -6,7 +6,7 @@ use hdf5_reader::Dataset;
 use hdf5_reader::reference::read_object_references;
 use std::collections::HashMap;
 
-/// What netCDF says of an axis without coordinates, for which it writes a scale all the same.
+/// The mark of a scale that netCDF writes for an axis without coordinates.
 const NO_COORDINATES: &str = "This is a netCDF dimension but not a netCDF variable";
 
 /// The scales of arrays, by the addresses of the arrays in the file.

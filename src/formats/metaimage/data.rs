@@ -71,7 +71,7 @@ impl Data<'_> {
         Ok(Part { path: file.path().into(), state: file.state(), frames, stored, at })
     }
 
-    /// Where the samples start; if they are as they are, they must fill the rest of the file.
+    /// Where the samples start. Uncompressed samples must fill the rest of the file.
     fn start(&self, file: &FileBytes, header: u64, planes: usize, times: usize) -> Result<u64> {
         let refused = |e| Error::input(file.path(), e);
         let (shape, ty) = (self.samples.flat(planes).map_err(refused)?, self.samples.ty);
@@ -93,7 +93,7 @@ impl Data<'_> {
         checked.map(|()| start).map_err(refused)
     }
 
-    /// Frames whose slices along z are files of their own.
+    /// Frames with each slice along z in its own file.
     fn slices(&self, paths: &mut dyn Iterator<Item = PathBuf>) -> Result<Part> {
         let [x, y, z] = self.samples.lengths;
         let stored = self.samples.stored(1).map_err(|e| Error::input(self.file.path(), e))?;

@@ -74,7 +74,7 @@ impl MetaImageHeader {
         self.fields.get(name).map(String::as_str)
     }
 
-    /// The fields that say nothing of the samples, as they are written.
+    /// The fields that do not describe the samples, unchanged.
     pub(super) fn others(&self) -> impl Iterator<Item = (&str, &str)> {
         let others = self.names.iter().filter(|name| !is_known(&name.to_lowercase()));
         others.filter_map(|name| Some((name.as_str(), self.get(&name.to_lowercase())?)))

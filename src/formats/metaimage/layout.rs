@@ -3,7 +3,7 @@
 use crate::base::stored::StoredType;
 use crate::formats::shared::types::Types;
 
-/// What the format is called, also in the description of what it holds.
+/// The format's name, also in descriptions.
 pub(super) const NAME: &str = "MetaImage";
 
 /// Fields that mean the same, in lower case.

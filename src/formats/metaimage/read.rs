@@ -44,7 +44,7 @@ fn description(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<O
     Ok((!is_plain).then_some(Description { global, ..described }))
 }
 
-/// What the samples are, wherever they are.
+/// The type and layout of the samples, whichever file has them.
 pub(super) struct MetaImageSamples {
     pub(super) axes: usize,
     /// Voxels along its axes of space, the fastest first, as they are stored.

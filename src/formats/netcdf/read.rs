@@ -21,10 +21,10 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the library puts where a float was never written.
+/// The NetCDF library's default fill value of floats.
 const UNWRITTEN: f64 = 9.969_209_968_386_869e36;
 
-/// Opens a file to see what it holds.
+/// Opens a file and lists its arrays.
 pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     ArrayArchive::open("NetCDF", path, Some(path), Arc::new(open_file), options)
 }

@@ -1,4 +1,4 @@
-//! What the header of a NIfTI says.
+//! The header of a NIfTI.
 
 use super::layout::{FIRST, NiftiBytes, SECOND};
 use crate::formats::shared::directions::Directions;

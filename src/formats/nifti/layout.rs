@@ -1,4 +1,4 @@
-//! Where the fields of a NIfTI header are, and what its codes mean. It has 348 bytes in version 1 and 540 in version 2, in
+//! The fields and codes of a NIfTI header. It has 348 bytes in version 1 and 540 in version 2, in
 //! either byte order.
 
 use crate::base::stored::StoredType;
@@ -12,7 +12,7 @@ pub(super) const SECOND: usize = 540;
 
 /// The offsets of fields. Real numbers have 32 bits in version 1 and 64 in version 2, codes 16 and 32, lengths 16 and 64.
 pub(super) struct Offsets {
-    /// What a file of samples and header together has there; a header alone has `ni` for `n+`.
+    /// The magic of a file with header and samples; a header alone has `ni` for `n+`.
     pub(super) magic: (usize, &'static [u8]),
     /// A number of 16 bits, then another with the bits of a sample.
     pub(super) datatype: usize,
@@ -104,7 +104,7 @@ pub(super) const SPACE_UNITS: UnitCodes = &[(1, &["m", "metre", "meter"]), (2, &
 
 pub(super) const TIME_UNITS: UnitCodes = &[(8, &["s", "sec", "seconds"]), (16, &["ms"]), (24, &["us", "\u{b5}s"])];
 
-/// Units of what is along the fourth axis if it is not time.
+/// Units of a fourth axis that is not time.
 pub(super) const OTHER_UNITS: UnitCodes = &[(32, &["Hz"]), (40, &["ppm"]), (48, &["rad/s"])];
 
 /// The bytes of a header.

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 const GZIP: &[u8] = b"\x1f\x8b";
 
-/// Reads the header and checks the size of what is not compressed.
+/// Reads the header, and checks the size of an uncompressed file.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let path = &header_of(path).unwrap_or_else(|| path.into());
     let refused = |e| Error::input(path, e);
@@ -57,7 +57,7 @@ fn beside(path: &Path, own: &str, others: &'static [&'static str]) -> impl Itera
     others.iter().map(move |e| bare.with_extension(if capitals { e.to_uppercase() } else { (*e).to_string() }))
 }
 
-/// The first bytes of the file as they are when decompressed, and whether they were compressed.
+/// The first bytes of the file after decompression, and whether it is compressed.
 fn header_bytes(path: &Path) -> Result<(Vec<u8>, bool)> {
     let bytes = head(&FileBytes::open(path, Access::Read)?, LONGEST)?;
     if !bytes.starts_with(GZIP) {

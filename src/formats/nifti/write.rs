@@ -10,7 +10,7 @@ use std::io::{self, Write};
 /// Bytes between the header and the samples: there are no extensions.
 const GAP: usize = 4;
 
-/// The longest axis that version 1 can say.
+/// The longest axis that version 1 can store.
 const LONGEST_OF_FIRST: usize = i16::MAX as usize;
 
 /// Axes that are known to be aligned with something.
@@ -63,7 +63,7 @@ impl NiftiBytes<Vec<u8>> {
         self.bytes[at..][..magic.len()].copy_from_slice(magic);
     }
 
-    /// What a source of another format says: the units, and the name of the variable.
+    /// The units and the name of the variable, from a source of another format.
     fn set_new(&mut self, contents: &Contents) {
         let at = self.offsets();
         self.bytes[at.units] = units(contents);
@@ -111,7 +111,7 @@ impl NiftiBytes<Vec<u8>> {
         self.set_real(at.slope, 1, 0.0);
     }
 
-    /// Where voxels and frames are. A header whose places are right stays as it is.
+    /// The positions of voxels and frames. A header with the right positions is not changed.
     fn set_places(&mut self, contents: &Contents) {
         let (at, lattice) = (self.offsets(), contents.lattice().turned_from(LPS));
         for (axis, spacing) in lattice.spacing().into_iter().enumerate() {
@@ -146,7 +146,7 @@ impl NiftiBytes<Vec<u8>> {
         }
     }
 
-    /// Sets a number unless the field says it as exactly as it can.
+    /// Sets a number, unless the field already holds the nearest value.
     fn set_real(&mut self, at: usize, index: usize, number: f64) {
         let old = self.real(at, index);
         if old == number || (old - number).abs() <= f64::from(f32::EPSILON) * number.abs() && self.is_first() {

@@ -16,7 +16,7 @@ use std::path::Path;
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
 
-/// What the header of an array of frames says.
+/// The header of an array of frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Array {
     /// Voxels and sample type of a frame.
@@ -35,7 +35,7 @@ pub(crate) struct Array {
     pub(crate) start: u64,
 }
 
-/// What the header of an array of any number of dimensions says.
+/// The header of an array of any number of dimensions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ArrayHeader {
     /// Lengths of the axes, the slowest first.
@@ -99,7 +99,7 @@ impl Array {
     }
 }
 
-/// What a header says.
+/// The content of a header.
 struct AnyHeader {
     lengths: Vec<u64>,
     ty: StoredType,

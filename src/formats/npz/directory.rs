@@ -1,4 +1,4 @@
-//! The files in a zip archive, by the directory at its end: what each is called, and where its bytes are.
+//! The directory at the end of a zip archive: the name of each file in it, and where its bytes are.
 
 use crate::base::error::{Error, Result};
 use crate::base::mapped::FileBytes;
@@ -113,7 +113,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// What the directory says of a member.
+/// A member's entry in the directory.
 struct Entry<'a> {
     flags: u64,
     method: u64,

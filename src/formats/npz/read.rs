@@ -61,7 +61,7 @@ struct Variable {
 }
 
 impl Variable {
-    /// The name without the number, and without what comes before that.
+    /// The name without the number and the separator before it.
     fn short_name(&self) -> &str {
         self.name.strip_suffix(STEP).map_or(self.name.as_str(), |name| name.trim_end_matches(['_', '-', '.', ' ']))
     }

@@ -102,7 +102,7 @@ impl Axes {
         Ok((0..self.sizes[axis]).map(|i| first + step * i as f64).collect())
     }
 
-    /// Units of what lies along the axes, and of samples.
+    /// Units of the axes, and of samples.
     pub(super) fn units(&self, header: &NrrdHeader) -> Units {
         let words = |field| quoted(header.get(field).unwrap_or_default());
         let (all, space) = (words("units"), words("spaceunits"));

@@ -1,9 +1,9 @@
-//! What a NRRD starts with, and its types.
+//! The magic of a NRRD, and its types.
 
 use crate::base::stored::StoredType;
 use crate::formats::shared::types::Types;
 
-/// What the format is called, also in the description of what it holds.
+/// The format's name, also in descriptions.
 pub(super) const NAME: &str = "NRRD";
 
 /// How every NRRD starts.

@@ -34,7 +34,7 @@ pub(crate) struct Stream<R> {
 }
 
 impl<R: Read> Stream<R> {
-    /// Reads what comes before the first frame.
+    /// Reads the header before the first frame.
     pub(crate) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
         let mut head = Vec::new();
         let magic = MAGIC.len() as u64;

@@ -1,6 +1,6 @@
-//! What VTK's arrays have a sample for.
+//! Whether a VTK array has its samples at points or in cells.
 
-/// What an array has one sample for.
+/// Where an array has its samples: one at each point, or one in each cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Association {
     /// Each point of the lattice.
@@ -15,7 +15,7 @@ impl Association {
         points.map(|n| if self == Self::Cells && n > 1 { n - 1 } else { n })
     }
 
-    /// Where the first sample is of a lattice whose first point is `first`: cells have theirs in their middle.
+    /// The position of the first sample of a lattice with the first point `first`. The sample of a cell is in its middle.
     pub(crate) fn origin(self, points: [usize; 3], first: [f64; 3], spacing: [f64; 3]) -> [f64; 3] {
         let shift = |axis: usize| if self == Self::Cells && points[axis] > 1 { spacing[axis] / 2.0 } else { 0.0 };
         std::array::from_fn(|axis| first[axis] + shift(axis))

@@ -1,4 +1,4 @@
-//! VTK's base64: what some texts one after another encode, perhaps broken by white space.
+//! VTK's base64: one or more encoded texts in a row, perhaps broken by white space.
 
 use super::text::Characters;
 use super::words::wrong;

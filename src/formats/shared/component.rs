@@ -3,7 +3,7 @@
 use crate::base::error::{Note, Remedy};
 use crate::source::Advised;
 
-/// A variable's name, and the component that is meant, if any is: `velocity[1]` and `velocity[y]` are the second one.
+/// A variable's name, and its component if one is given: `velocity[1]` and `velocity[y]` are the second component.
 pub(crate) fn named(variable: &str) -> (&str, Option<usize>) {
     let Some((name, index)) = variable.strip_suffix(']').and_then(|text| text.rsplit_once('[')) else {
         return (variable, None);
@@ -15,7 +15,7 @@ pub(crate) fn named(variable: &str) -> (&str, Option<usize>) {
     }
 }
 
-/// Which of some components is meant; an error that says how to say it.
+/// The index of a component; the error lists the valid forms.
 pub(crate) fn chosen(name: &str, components: usize, index: Option<usize>) -> Advised<usize> {
     match index {
         _ if components == 0 => Err(format!("{name} has no component").into()),
@@ -29,7 +29,7 @@ pub(crate) fn chosen(name: &str, components: usize, index: Option<usize>) -> Adv
     }
 }
 
-/// Finds the component of a file's only array that the option `variable` means, and its name. If an array without a
+/// Finds the component of a file's only array that the option `variable` names, and its name. If an array without a
 /// name needs one, it is `samples`.
 pub(crate) fn only_array(
     own: Option<&str>,
@@ -50,7 +50,7 @@ pub(crate) fn only_array(
     Ok((index, called))
 }
 
-/// An array of some, and a component of it.
+/// The number of an array, and of a component of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Chosen {
     /// Which of the arrays.

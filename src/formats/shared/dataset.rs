@@ -40,7 +40,7 @@ pub(crate) struct SamplesVariable {
     pub(crate) fill: Option<f64>,
 }
 
-/// Names of axes without one, by what they count: frames, x, y, z.
+/// Default names of the axes of frames, x, y, z.
 const NAMES: [&str; 4] = ["time", "x", "y", "z"];
 
 impl Dataset {
@@ -111,7 +111,7 @@ fn samples_attributes(contents: &Contents, description: &Description) -> Vec<Att
     attributes
 }
 
-/// Names and lengths of all dimensions. Those without a name are called by what they count; no two are called the same.
+/// Names and lengths of all dimensions. A dimension without a name gets the default of its axis; all names differ.
 fn named_dimensions(description: &Description) -> Vec<(String, u64)> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
     let role = |number: usize| description.axes.iter().find(|axis| axis.dimension as usize == number).map(|a| a.role);
@@ -181,7 +181,7 @@ fn text(name: &str, value: &str) -> Attribute {
     Attribute { name: name.into(), value: Values::text(value) }
 }
 
-/// A name of a variable or dimension without what no format takes in names.
+/// A name of a variable or dimension, without characters that some format refuses in names.
 fn sound(name: &str) -> String {
     let name: String = name.chars().map(|c| if c.is_control() || c == '/' { '_' } else { c }).collect();
     if name.is_empty() { "unnamed".into() } else { name }

@@ -1,4 +1,4 @@
-//! How the axes of an array go in the world: along the world's in any order and direction, or aslant.
+//! The directions of an array's axes in the world: along the world's axes in any order and direction, or oblique.
 
 use crate::base::description::{ArrayAxis, AxisRole, Description, Dimension, Orientation};
 use crate::base::error::Note;
@@ -28,7 +28,7 @@ pub(crate) struct Placed {
     pub(crate) spacing: [f64; 3],
     /// World position of its first voxel.
     pub(crate) origin: [f64; 3],
-    /// What a user should know.
+    /// Notes for the user.
     pub(crate) note: Option<Note>,
 }
 
@@ -63,7 +63,7 @@ impl Directions {
         std::array::from_fn(|axis| self.first[axis] + along(axis))
     }
 
-    /// Turns an array of these lengths so that its axes ascend along x, y, z. One that is aslant stays as it is stored.
+    /// Turns an array of these lengths so that its axes ascend along x, y, z. An oblique array keeps its stored order.
     pub(crate) fn placed(&self, lengths: [usize; 3], what: &str) -> Placed {
         let norms = self.steps().map(|step| step.iter().map(|c| c * c).sum::<f64>().sqrt());
         let Some(along) = self.straight(&norms) else {
@@ -129,7 +129,7 @@ impl Placed {
     }
 }
 
-/// Says what is turned, if anything.
+/// A note on the axes that are turned, if any are.
 fn turned(axes: &[(usize, bool); 3]) -> Option<String> {
     let stored =
         axes.map(|(axis, backwards)| format!("{}{}", if backwards { '-' } else { '+' }, ["x", "y", "z"][axis]));

@@ -1,8 +1,8 @@
-//! Names of files from a printf pattern and the numbers that it is for.
+//! File names from a printf pattern and a range of numbers.
 
 use crate::source::Parsed;
 
-/// How many numbers there are from the first to the last.
+/// The count of numbers from the first to the last, both included.
 pub(crate) fn count(first: i64, last: i64, step: i64) -> Parsed<usize> {
     let wrong = || format!("data file numbers from {first} to {last} in steps of {step} make no sense");
     let span = last.checked_sub(first).ok_or_else(wrong)?;

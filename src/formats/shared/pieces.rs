@@ -16,7 +16,7 @@ pub(crate) trait Packed: Debug + Send {
     fn open(&self, file: FileBytes) -> io::Result<Box<dyn Read>>;
 }
 
-/// Samples in a file, as they are or compressed.
+/// Samples in a file, raw or compressed.
 #[derive(Debug)]
 pub(crate) struct Stream {
     /// Where the samples start in the file, or the compressed stream that holds them.
@@ -40,7 +40,7 @@ impl Packed for Stream {
 /// A box of a frame.
 #[derive(Debug)]
 pub(crate) struct Piece {
-    /// The file that has its samples.
+    /// The file with its samples.
     pub(crate) path: PathBuf,
     /// The file's state when it was checked.
     pub(crate) state: State,
@@ -59,7 +59,7 @@ pub(crate) struct Pieces {
     pub(crate) dims: [usize; 3],
     /// Bytes of a voxel, all components together.
     pub(crate) voxel: usize,
-    /// Frames that lie together, and are one here.
+    /// The number of frames that are stored together and decoded as one.
     pub(crate) together: usize,
     /// The pieces of each frame, all within its dimensions.
     pub(crate) frames: Vec<Vec<Piece>>,

@@ -1,4 +1,4 @@
-//! Numbers in the text of headers, and what is said of text that is wrong.
+//! Numbers in the text of headers, and messages about text that is wrong.
 
 use crate::source::Parsed;
 use std::io::{self, ErrorKind};
@@ -26,12 +26,12 @@ pub(crate) fn array<T: FromStr + Copy, const N: usize>(text: &str, what: &str) -
     numbers(text, what, N).map(|all| std::array::from_fn(|i| all[i]))
 }
 
-/// The start of what may be anything.
+/// The first characters of a text, for messages: the text may be of any length.
 pub(crate) fn shortened(text: &str) -> String {
     text.chars().take(40).collect()
 }
 
-/// What is wrong with a file, for those who read it.
+/// A message about what is wrong with a file.
 pub(crate) fn wrong(what: String) -> io::Error {
     io::Error::new(ErrorKind::InvalidData, what)
 }

@@ -1,4 +1,4 @@
-//! What ImageJ writes into the first page: lines such as `slices=5`. Channels are fastest, then planes, then frames.
+//! The text that ImageJ writes into the first page: lines such as `slices=5`. Channels are fastest, then planes, then frames.
 
 use super::stack::{Stack, positive};
 use crate::formats::shared::words::number;

@@ -1,4 +1,4 @@
-//! What the Open Microscopy Environment writes into the first page: XML.
+//! The XML that the Open Microscopy Environment writes into the first page.
 
 use super::stack::{Stack, positive};
 use crate::formats::shared::words::number;
@@ -7,7 +7,7 @@ use crate::source::Parsed;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-/// Units of length in micrometres, and what they are called here.
+/// Units of length in micrometres, and their names here.
 const LENGTHS: [(&str, &str, f64); 8] = [
     ("µm", "um", 1.0),
     ("μm", "um", 1.0),

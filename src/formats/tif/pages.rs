@@ -169,7 +169,7 @@ impl Pages {
     }
 }
 
-/// What the current page is made of, or why it is not supported.
+/// The layout of the current page, or why it is not supported.
 fn page(decoder: &mut Decoder<BufReader<File>>) -> TiffResult<Parsed<Page>> {
     let compression = decoder.find_tag_unsigned::<u16>(Tag::Compression)?.unwrap_or(1);
     let (x, y) = decoder.dimensions()?;

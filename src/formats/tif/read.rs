@@ -20,7 +20,7 @@ const SHARE: usize = 4;
 /// Bytes that one compressed byte can stand for.
 const MOST: u64 = 4096;
 
-/// Goes through all pages, which must be alike, and reads what the first says of them.
+/// Checks that all pages are alike, and reads the first page's description.
 pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let mut pages = Pages::open(path)?;

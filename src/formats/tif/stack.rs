@@ -20,7 +20,7 @@ pub(super) struct Stack {
 }
 
 impl Stack {
-    /// By what the first page says of `pages` pages; without a word they are one frame.
+    /// From the first page's description of `pages` pages. Without a description, they are one frame.
     pub(super) fn parse(said: &str, pages: usize, pixels_per_unit: [Option<f64>; 2]) -> Parsed<Self> {
         let stack = match said {
             said if ome::is_ome(said) => ome::parse(said)?,
@@ -70,7 +70,7 @@ impl Stack {
     }
 }
 
-/// A length that a file may well say: positive.
+/// A length, if it is positive.
 pub(super) fn positive(value: f64) -> Option<f64> {
     Some(value).filter(|value| value.is_finite() && *value > 0.0)
 }

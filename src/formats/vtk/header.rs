@@ -1,4 +1,4 @@
-//! What the text of a legacy VTK file says, and where its arrays are.
+//! The text of a legacy VTK file, and where its arrays are.
 
 use super::lines::Lines;
 use crate::base::error::{Error, Result};
@@ -82,7 +82,7 @@ impl VtkHeader {
         self.arrays.iter().map(|array| (array.name.as_str(), array.components)).collect()
     }
 
-    /// Whether a line says something of the lattice, or what arrays are of.
+    /// Whether a line describes the lattice, or says whether arrays are of points or cells.
     fn geometry(&mut self, words: &[&str]) -> Parsed<bool> {
         match (words[0].to_uppercase().as_str(), &words[1..]) {
             ("DATASET", [kind]) if kind.eq_ignore_ascii_case("STRUCTURED_POINTS") => {}

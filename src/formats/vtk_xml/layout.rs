@@ -16,10 +16,10 @@ pub(super) const TYPES: Types<&str> = Types(&[
     (StoredType::F64, &["Float64"]),
 ]);
 
-/// What image data is called in a description.
+/// The name of image data in a description.
 pub(super) const IMAGE_DATA: &str = "VTK image data";
 
-/// What a rectilinear grid is called in a description.
+/// The name of a rectilinear grid in a description.
 pub(super) const RECTILINEAR_GRID: &str = "VTK rectilinear grid";
 
 /// The field with the time of a file.

@@ -18,7 +18,7 @@ use zarrs::group::Group;
 
 const MOST_DEPTH: usize = 16;
 
-/// Opens a folder to see what it holds.
+/// Opens a folder and lists its arrays.
 pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let metadata = metadata_file(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
     ArrayArchive::open("Zarr", path, Some(&metadata), Arc::new(open_folder), options)
@@ -156,7 +156,7 @@ fn variable(array: &Array<FilesystemStore>) -> Variable {
     variable
 }
 
-/// What is said of an array. In version 2 xarray keeps what stands for missing samples as the array's fill value alone.
+/// The attributes of an array. In version 2, xarray stores the value of missing samples only as the array's fill value.
 fn attributes(array: &Array<FilesystemStore>) -> Attributes {
     let mut found: Attributes =
         array.attributes().iter().filter_map(|(name, value)| Some((name.clone(), attribute(value)?))).collect();
@@ -170,7 +170,7 @@ fn attributes(array: &Array<FilesystemStore>) -> Attributes {
     found
 }
 
-/// A value as JSON says it; what is neither a text nor numbers is left out.
+/// A value from JSON. Values that are neither texts nor numbers are left out.
 fn attribute(value: &Value) -> Option<Attribute> {
     let number = |value: &Value| match value.as_str() {
         Some("NaN") => Some(f64::NAN),

@@ -168,7 +168,7 @@ fn bytes_of(values: &Values) -> (String, Vec<u8>) {
     }
 }
 
-/// A number of a type, as JSON has it: words stand for what is not finite.
+/// A number of a type as JSON. NaN and infinities are written as strings.
 fn fill_value(ty: SampleType, fill: f64) -> Value {
     match fill {
         fill if fill.is_nan() => json!("NaN"),

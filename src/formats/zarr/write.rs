@@ -71,7 +71,7 @@ impl StoreSink {
     }
 }
 
-/// Checks in advance that the store can be created, as far as that is possible.
+/// Checks in advance, where possible, that the store can be created.
 fn check(path: &Path, force: bool) -> Result<()> {
     if !path.exists() {
         return Ok(());

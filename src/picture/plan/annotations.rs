@@ -1,4 +1,4 @@
-//! What is drawn around the volume.
+//! Annotations around the volume.
 
 use super::axes::Axes;
 use super::format::is_page;

@@ -23,13 +23,13 @@ pub(crate) struct Axis {
 pub(crate) struct Axes([Axis; 3]);
 
 impl Axes {
-    /// The axes of a grid with true heights, and what its source says of them.
+    /// The axes of a grid with true heights, with names and units from the source's description.
     pub(crate) fn new(grid: &Grid, description: Option<&Description>) -> Self {
         Self(std::array::from_fn(|along| Axis::new(grid, description, along)))
     }
 
     /// The axes of a coefficient file.
-    pub(crate) fn of_file(file: &CoefficientFile) -> Result<Self> {
+    pub(crate) fn from_file(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
         let grid = Grid { dims: m.dims.map(|n| n as usize), spacing: m.spacing, origin: m.origin };
         Ok(Self::new(&grid, file.description()?.as_ref()))

@@ -20,8 +20,8 @@ pub(in crate::picture) struct Colouring {
     /// The meaning of a pixel's numbers.
     pub(in crate::picture) pixel: Pixel,
     pub(in crate::picture) map: TransferFunction,
-    pub(in crate::picture) of_pictures: Scale,
-    pub(in crate::picture) of_errors: Scale,
+    pub(in crate::picture) picture_scale: Scale,
+    pub(in crate::picture) error_scale: Scale,
     /// Whether pictures are in colours.
     in_colours: bool,
     /// Whether pictures of errors are.
@@ -38,13 +38,13 @@ pub(in crate::picture) struct ColouredPictures {
 impl Colouring {
     pub(in crate::picture) fn coloured(&self) -> ColouredPictures {
         ColouredPictures {
-            range: self.in_colours.then(|| self.of_pictures.range()),
-            error_range: self.errors_in_colours.then(|| self.of_errors.range()),
+            range: self.in_colours.then(|| self.picture_scale.range()),
+            error_range: self.errors_in_colours.then(|| self.error_scale.range()),
         }
     }
 }
 
-/// What decides the colours of pictures.
+/// The settings and facts that decide the colours of pictures.
 pub(in crate::picture) struct ColouringInput<'a> {
     pub(in crate::picture) request: &'a PictureRequest,
     /// Numbers of a sample.
@@ -66,23 +66,25 @@ impl ColouringInput<'_> {
         let request = self.request;
         let pixel = self.pixel()?;
         let in_colours = !self.pictures.format.is_of_numbers() || request.colormap.is_some();
-        let of_errors = self.errors.is_some_and(|errors| !errors.format.is_of_numbers());
+        let errors_in_colours = self.errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel);
         let is_clear = self.may_be_clear(pixel) && finds_clear(request);
-        let ranges = ranges(Needed { of_pictures: in_colours && (fixed.is_none() || is_clear), of_errors })?;
-        let of_samples = self.colours.filter(|_| pixel != Pixel::Value);
-        let map = of_samples.map_or_else(|| value_colours(request), |colours| Ok(colours.clone()))?;
+        let ranges =
+            ranges(Needed { pictures: in_colours && (fixed.is_none() || is_clear), errors: errors_in_colours })?;
+        let sample_colours = self.colours.filter(|_| pixel != Pixel::Value);
+        let map = sample_colours.map_or_else(|| value_colours(request), |colours| Ok(colours.clone()))?;
         let (range, norm) = match pixel {
             Pixel::Value => value_spread(request, &map, &ranges, in_colours, reporter)?,
             _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
         };
-        report_ranges(range, &ranges, Needed { of_pictures: in_colours && fixed.is_none(), of_errors }, reporter);
+        let found = Needed { pictures: in_colours && fixed.is_none(), errors: errors_in_colours };
+        report_ranges(range, &ranges, found, reporter);
         let scale = |range, norm| Scale::new(&map, range, norm, background(request));
-        let (pictures, errors) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
+        let (picture_scale, error_scale) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
         let may_be_clear = in_colours && self.may_be_clear(pixel);
         let clear = may_be_clear.then(|| clear_values(request, &ranges, range, reporter)).flatten();
-        let (of_pictures, of_errors_too) = (pictures.with_clear(clear), errors);
-        Ok(Colouring { pixel, of_pictures, of_errors: of_errors_too, in_colours, errors_in_colours: of_errors, map })
+        let picture_scale = picture_scale.with_clear(clear);
+        Ok(Colouring { pixel, map, picture_scale, error_scale, in_colours, errors_in_colours })
     }
 
     /// Whether some values may show the background. Slices show them all.
@@ -122,18 +124,18 @@ impl ColouringInput<'_> {
 
 /// The background: as given, or that of the theme.
 fn background(request: &PictureRequest) -> Rgb {
-    let of_theme = match request.theme {
+    let theme_colour = match request.theme {
         Theme::Dark => [0; 3],
         Theme::Light => [255; 3],
     };
-    request.background.map_or(of_theme, |colour| colour.0)
+    request.background.map_or(theme_colour, |colour| colour.0)
 }
 
 fn report_ranges((lo, hi): (f64, f64), ranges: &Ranges, found: Needed, reporter: &dyn Reporter) {
-    if found.of_pictures || found.of_errors {
+    if found.pictures || found.errors {
         reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
     }
-    if found.of_errors {
+    if found.errors {
         reporter.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
     }
 }
@@ -152,7 +154,7 @@ pub(in crate::picture) fn automatic_colours(
         return Ok(Some(colours));
     }
     if modes::has_automatic_range(request)? {
-        let needed = Needed { of_pictures: true, of_errors: false };
+        let needed = Needed { pictures: true, errors: false };
         colours = Ranges::small(scene, config, needed, reporter)?.stretch(&colours)?;
         let (lo, hi) = colours.range();
         reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));

@@ -86,7 +86,7 @@ impl Plan {
         Ok(Self { scene, file, config, targets, colouring, provenance, annotation })
     }
 
-    /// What the sinks of the pictures need.
+    /// The input of the sinks of the pictures.
     pub(super) fn sinks<'a>(&'a self, request: &'a PictureRequest) -> SinkInput<'a> {
         let Self { config, targets, colouring, provenance, annotation, .. } = self;
         SinkInput { request, config, targets, colouring, provenance, annotation }

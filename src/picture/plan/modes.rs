@@ -1,4 +1,4 @@
-//! How the samples along a ray make a pixel, and what may be asked of each mode.
+//! How the samples along a ray make a pixel, and which settings each mode accepts.
 
 use super::named_colours::open_colours;
 use super::named_colours::stretched;

@@ -77,7 +77,7 @@ impl Opened {
         let annotation = annotation(request, values_of(&file)?, time_labels(file.metadata()));
         let colours = modes::colours_of_file(request, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), request.method));
-        let axes = Axes::of_file(&file)?;
+        let axes = Axes::from_file(&file)?;
         Ok(Self { scene, file: Some(file), exaggeration, annotation, colours, axes })
     }
 

@@ -50,7 +50,7 @@ pub(in crate::picture) fn provenance(
         None => provenance,
     };
     match colouring.coloured().range {
-        Some(_) => in_colours(provenance, colouring, &colouring.of_pictures),
+        Some(_) => in_colours(provenance, colouring, &colouring.picture_scale),
         None => provenance,
     }
 }
@@ -132,7 +132,7 @@ pub(in crate::picture) fn error_provenance(provenance: &Provenance, colouring: &
         ..provenance.clone()
     };
     match colouring.coloured().error_range {
-        Some(_) => in_colours(provenance, colouring, &colouring.of_errors),
+        Some(_) => in_colours(provenance, colouring, &colouring.error_scale),
         None => provenance,
     }
 }

@@ -169,7 +169,7 @@ fn values_of_overview(
         return Ok(None);
     };
     let (grid, mut values) = (thinning.grid(scene.grid()), Vec::new());
-    let config = of_overview(&request, &grid, small, size_of_val(&overview[..]));
+    let config = overview_config(&request, &grid, small, size_of_val(&overview[..]));
     for samples in overview.chunks_exact(request.samples()) {
         let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
         let mut frames = FrameScene::new(Box::new(ArraySource::new(grid, SampleType::F32, bytes)?), None);
@@ -195,7 +195,7 @@ fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
 }
 
 /// The settings of small pictures of an overview, which takes `bytes` twice.
-fn of_overview(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig, bytes: usize) -> RenderConfig {
+fn overview_config(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig, bytes: usize) -> RenderConfig {
     let sigma = small.kernel.sigma.max(SIGMA * grid.largest_spacing());
     RenderConfig {
         kernel: Kernel { sigma, ..small.kernel },
@@ -230,8 +230,8 @@ fn pictures(
 /// Which ranges are needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::picture) struct Needed {
-    pub(in crate::picture) of_pictures: bool,
-    pub(in crate::picture) of_errors: bool,
+    pub(in crate::picture) pictures: bool,
+    pub(in crate::picture) errors: bool,
 }
 
 /// The ranges of the pictures and of their errors.
@@ -257,21 +257,21 @@ impl Ranges {
     pub(in crate::picture) fn small(
         scene: &mut dyn Scene,
         config: &RenderConfig,
-        Needed { of_pictures, of_errors }: Needed,
+        needed: Needed,
         reporter: &dyn Reporter,
     ) -> Result<Self> {
         let mut ranges = Self::default();
-        if !of_pictures && !of_errors {
+        if !needed.pictures && !needed.errors {
             return Ok(ranges);
         }
         check(scene, config)?; // before small pictures are rendered, so that errors name the full size
         let small = small(config);
-        if of_pictures {
+        if needed.pictures {
             let rough = rough(&small);
             let values = values_of_overview(scene, &rough, reporter)?;
             ranges.set_values(values.map_or_else(|| values_of_frames(scene, &rough, reporter), Ok)?);
         }
-        if of_errors {
+        if needed.errors {
             let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
             let report = pictures(
                 scene,
@@ -285,7 +285,7 @@ impl Ranges {
     }
 
     /// The ranges of pictures of a few of some frames. `render` gives them, row by row.
-    pub(in crate::picture) fn of_pictures(
+    pub(in crate::picture) fn from_pictures(
         frames: &[usize],
         render: impl FnOnce(&[usize], &mut dyn FnMut(&[f32])) -> Result<()>,
     ) -> Result<Self> {
@@ -337,13 +337,13 @@ impl Ranges {
                 self.positive.ok_or_else(|| Error::setting("norm", "log: no value is above 0; give `norm` linear"))?;
             return Ok((least.max(hi * DECADES), hi));
         }
-        Ok(if lo < hi { map.suitable(of_noticeable_width((lo, hi))) } else { (lo, hi) })
+        Ok(if lo < hi { map.suitable(at_least_noticeable((lo, hi))) } else { (lo, hi) })
     }
 }
 
 /// The range around the same middle, at least as wide as a hundred thousandth of its values. What changes by less is mostly
 /// rounding, and should look constant.
-fn of_noticeable_width((lo, hi): (f64, f64)) -> (f64, f64) {
+fn at_least_noticeable((lo, hi): (f64, f64)) -> (f64, f64) {
     const LEAST: f64 = 1e-5;
     let (middle, half) = (lo / 2.0 + hi / 2.0, LEAST / 2.0 * lo.abs().max(hi.abs()));
     if (hi - lo) / 2.0 < half { (middle - half, middle + half) } else { (lo, hi) }
@@ -356,10 +356,10 @@ mod tests {
     #[test]
     fn ranges_are_wider_than_rounding() {
         let near = |(lo, hi): (f64, f64), (a, b): (f64, f64)| (lo - a).abs() < 1e-9 && (hi - b).abs() < 1e-9;
-        assert!(near(of_noticeable_width((300.0, 300.00003)), (299.998_515, 300.001_515)));
-        assert!(near(of_noticeable_width((-5.000_001, -5.0)), (-5.000_025_5, -4.999_975_5)));
+        assert!(near(at_least_noticeable((300.0, 300.00003)), (299.998_515, 300.001_515)));
+        assert!(near(at_least_noticeable((-5.000_001, -5.0)), (-5.000_025_5, -4.999_975_5)));
         for range in [(300.0, 300.1), (0.0, 1e-20), (-1e-9, 1e-9), (1.0, 1.000_011)] {
-            assert_eq!(of_noticeable_width(range), range);
+            assert_eq!(at_least_noticeable(range), range);
         }
     }
 }

@@ -34,7 +34,7 @@ impl Sinks {
     }
 }
 
-/// What the sinks of a run need.
+/// The input of the sinks of a run.
 pub(in crate::picture) struct SinkInput<'a> {
     pub(in crate::picture) request: &'a PictureRequest,
     pub(in crate::picture) config: &'a RenderConfig,
@@ -55,7 +55,7 @@ impl SinkInput<'_> {
             provenance: Arc::new(self.provenance.clone()),
             fps: frames_per_second(request, config, &annotation.times)?,
             pixel: self.colouring.pixel,
-            colours: self.colouring.of_pictures.clone(),
+            colours: self.colouring.picture_scale.clone(),
             depth: request.depth,
             coloured_array: request.colormap.is_some(),
             annotation: (request.is_annotated() || is_page(request)).then(|| annotation.clone()),
@@ -65,24 +65,24 @@ impl SinkInput<'_> {
 
     /// Opens the sinks of a run.
     pub(in crate::picture) fn open(&self) -> Result<Sinks> {
-        let of_pictures = self.config()?;
+        let sink_config = self.config()?;
         let errors = match &self.targets.errors {
-            Some(errors) => open(errors, &self.error_config(errors, &of_pictures), self.config)?,
+            Some(errors) => open(errors, &self.error_config(errors, &sink_config), self.config)?,
             None => Vec::new(),
         };
-        Ok(Sinks { pictures: open(&self.targets.pictures, &of_pictures, self.config)?, errors })
+        Ok(Sinks { pictures: open(&self.targets.pictures, &sink_config, self.config)?, errors })
     }
 
     /// The settings of the sinks of errors.
-    fn error_config(&self, errors: &Targets, of_pictures: &SinkConfig) -> SinkConfig {
-        let Colouring { pixel, of_errors, .. } = self.colouring;
+    fn error_config(&self, errors: &Targets, sink_config: &SinkConfig) -> SinkConfig {
+        let Colouring { pixel, error_scale, .. } = self.colouring;
         SinkConfig {
             format: errors.format,
             provenance: Arc::new(error_provenance(self.provenance, self.colouring)),
             pixel: if *pixel == Pixel::Light { Pixel::Value } else { *pixel },
-            colours: of_errors.clone(),
+            colours: error_scale.clone(),
             coloured_array: false,
-            ..of_pictures.clone()
+            ..sink_config.clone()
         }
     }
 }

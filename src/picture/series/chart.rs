@@ -103,18 +103,18 @@ impl Chart {
         for y in round_values(frame.y.0, frame.y.1, 6) {
             let at = frame.at_y(y);
             let _ = writeln!(svg, "<path class=\"grid\" d=\"M{LEFT} {at:.2}H{right}\"/>");
-            text(svg, (LEFT - 6.0, at + 4.0), "end", "", &number(y));
+            text(svg, [LEFT - 6.0, at + 4.0], "end", "", &number(y));
         }
         for (x, label) in self.x_ticks(frame) {
             let at = frame.at_x(x);
             let _ = writeln!(svg, "<path class=\"grid\" d=\"M{at:.2} {TOP}V{bottom}\"/>");
-            text(svg, (at, bottom + 18.0), "middle", "", &label);
+            text(svg, [at, bottom + 18.0], "middle", "", &label);
         }
         let (width, height) = (right - LEFT, bottom - TOP);
         let _ = writeln!(svg, "<rect class=\"frame\" x=\"{LEFT}\" y=\"{TOP}\" width=\"{width}\" height=\"{height}\"/>");
-        text(svg, (f64::midpoint(LEFT, right), bottom + 40.0), "middle", "", &self.x_name);
+        text(svg, [f64::midpoint(LEFT, right), bottom + 40.0], "middle", "", &self.x_name);
         let middle = f64::midpoint(TOP, bottom);
-        text(svg, (18.0, middle), "middle", &format!(" transform=\"rotate(-90 18 {middle})\""), &self.y_name);
+        text(svg, [18.0, middle], "middle", &format!(" transform=\"rotate(-90 18 {middle})\""), &self.y_name);
     }
 
     /// Round numbers, or the dates of frames a round number apart.
@@ -145,7 +145,7 @@ impl Chart {
         }
         let y = HEIGHT + LEGEND_ROW * (number as f64 + 0.5) - 8.0;
         let _ = writeln!(svg, "<path stroke=\"{colour}\" stroke-width=\"3\" d=\"M{LEFT} {y}h24\"/>");
-        text(svg, (LEFT + 32.0, y + 4.0), "start", "", &line.name);
+        text(svg, [LEFT + 32.0, y + 4.0], "start", "", &line.name);
     }
 }
 
@@ -156,14 +156,14 @@ fn number(v: f64) -> String {
     if is_plain { (rounded + 0.0).to_string() } else { format!("{rounded:e}") }
 }
 
-fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, more: &str, text: &str) {
+fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, more: &str, text: &str) {
     let text = escaped(text);
     let _ = writeln!(svg, "<text x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\"{more}>{text}</text>");
 }
 
 /// A text without markup and without characters that XML does not allow.
 fn escaped(text: &str) -> String {
-    let of = |c: char| match c {
+    let escape = |c: char| match c {
         '&' => "&amp;".into(),
         '<' => "&lt;".into(),
         '>' => "&gt;".into(),
@@ -171,7 +171,7 @@ fn escaped(text: &str) -> String {
         c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => " ".into(),
         c => c.to_string(),
     };
-    text.chars().map(of).collect::<Vec<String>>().concat()
+    text.chars().map(escape).collect::<Vec<String>>().concat()
 }
 
 #[cfg(test)]

@@ -117,7 +117,7 @@ struct AllSeries {
 impl AllSeries {
     fn read(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Self> {
         let file = probed_file(session, request)?;
-        let axes = Axes::of_file(&file)?;
+        let axes = Axes::from_file(&file)?;
         let frames = frames_of(request, file.frames())?;
         let mut report = SeriesReport { frames: frames.len(), ..SeriesReport::default() };
         let mut series = Vec::new();

@@ -8,7 +8,7 @@ use crate::file::{CoefficientFile, setting, time_labels};
 use crate::picture::plan::axes::text;
 use std::fmt::Write as _;
 
-/// What the file calls its samples and times.
+/// The names and units of samples and times.
 pub(super) struct Named {
     variable: String,
     unit: String,

@@ -82,14 +82,14 @@ impl SurfaceList {
     pub(crate) fn surfaces(&self, map: &TransferFunction, is_map_given: bool) -> Vec<Surface> {
         let (lo, hi) = map.range();
         let is_single = self.0.len() == 1;
-        let of_map = |value| map.colour(value).filter(|_| is_map_given || !is_single).unwrap_or(COLOUR);
+        let map_colour = |value| map.colour(value).filter(|_| is_map_given || !is_single).unwrap_or(COLOUR);
         let surface = |named: &Named| {
             let value = match named.at {
                 At::Value(value) => value,
                 At::Share(share) => lo + share * (hi - lo),
             };
             let opacity = named.opacity.unwrap_or(if is_single { 1.0 } else { 0.6 });
-            Surface { value, colour: named.colour.map_or_else(|| of_map(value), HexColour::shares), opacity }
+            Surface { value, colour: named.colour.map_or_else(|| map_colour(value), HexColour::shares), opacity }
         };
         self.0.iter().map(surface).collect()
     }

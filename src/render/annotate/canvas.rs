@@ -87,12 +87,12 @@ impl Canvas<'_> {
     /// The same in letters of another size.
     pub(super) fn write_in(&mut self, letters: &Letters, text: &str, middle: [f64; 2]) -> bool {
         let half = [letters.width(text) / 2.0, letters.size / 2.0];
-        let place = [-1.0, 1.0].map(|side| std::array::from_fn(|i| middle[i] + side * half[i]));
-        let fits = !text.is_empty() && self.is_free(&place);
+        let corners = [-1.0, 1.0].map(|side| std::array::from_fn(|i| middle[i] + side * half[i]));
+        let fits = !text.is_empty() && self.is_free(&corners);
         if fits {
             let ink = self.ink;
             letters.draw(text, middle, |x, y, share| self.put(x, y, ink, share));
-            self.taken.push(place);
+            self.taken.push(corners);
         }
         fits
     }

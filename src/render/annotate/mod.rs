@@ -86,7 +86,7 @@ impl Annotation {
         let Finished { pixels, size, background, frame, view, with_angles, scale, opacity } = picture;
         let mut canvas = Canvas::new(pixels, size, background);
         if has_time(size) {
-            self.draw_texts(&mut canvas, (frame, view.filter(|_| with_angles)));
+            self.draw_texts(&mut canvas, frame, view.filter(|_| with_angles));
         }
         if let Some(scale) = scale.filter(|_| self.parts.bar && has_bar(size)) {
             self.draw_bar(&mut canvas, scale);
@@ -94,26 +94,21 @@ impl Annotation {
         if let (Some(axes), Some(view)) = (&self.axes, view)
             && let Some(camera) = camera(axes, size, view)
         {
-            self.draw_volume(&mut canvas, (axes, &camera), opacity);
+            self.draw_volume(&mut canvas, axes, &camera, opacity);
         }
         canvas.taken
     }
 
     /// Draws the box and the axes, which are the same for all frames of a view, as if nothing lay in front of them.
-    pub(crate) fn draw_still(&self, pixels: &mut [Rgb], (size, background): ([usize; 2], Rgb), view: &ViewReport) {
+    pub(crate) fn draw_still(&self, pixels: &mut [Rgb], size: [usize; 2], background: Rgb, view: &ViewReport) {
         let mut canvas = Canvas::new(pixels, size, background);
         if let Some((axes, camera)) = self.axes.as_ref().and_then(|axes| Some((axes, camera(axes, size, view)?))) {
-            self.draw_volume(&mut canvas, (axes, &camera), &|_| 0.0);
+            self.draw_volume(&mut canvas, axes, &camera, &|_| 0.0);
         }
     }
 
     /// The box behind the picture, and the axes beside it.
-    fn draw_volume(
-        &self,
-        canvas: &mut Canvas<'_>,
-        (axes, camera): (&VolumeAxes, &Camera),
-        opacity: &dyn Fn(usize) -> f64,
-    ) {
+    fn draw_volume(&self, canvas: &mut Canvas<'_>, axes: &VolumeAxes, camera: &Camera, opacity: &dyn Fn(usize) -> f64) {
         if self.parts.bounds {
             let (size, ink, width) = (canvas.letters.size, canvas.ink, canvas.width);
             let mut shares = vec![0.0_f64; canvas.pixels.len()];
@@ -144,7 +139,7 @@ impl Annotation {
     }
 
     /// The title at the top, and the longest of the labels that fits at the top left.
-    fn draw_texts(&self, canvas: &mut Canvas<'_>, (frame, angles): (usize, Option<&ViewReport>)) {
+    fn draw_texts(&self, canvas: &mut Canvas<'_>, frame: usize, angles: Option<&ViewReport>) {
         let size = canvas.letters.size;
         for text in self.labels(frame, angles) {
             let half = canvas.letters.width(&text) / 2.0;
@@ -152,18 +147,13 @@ impl Annotation {
                 break;
             }
         }
-        if let Some(title) = self.placed_title(&canvas.letters, canvas.size()[0], (frame, angles)) {
+        if let Some(title) = self.placed_title(&canvas.letters, canvas.size()[0], frame, angles) {
             title.write(canvas, size);
         }
     }
 
     /// Where the title stands: at the same place for all frames.
-    fn placed_title(
-        &self,
-        letters: &Letters,
-        width: f64,
-        (frame, angles): (usize, Option<&ViewReport>),
-    ) -> Option<Title> {
+    fn placed_title(&self, letters: &Letters, width: f64, frame: usize, angles: Option<&ViewReport>) -> Option<Title> {
         let side = SIDE * letters.size;
         let fits = |text: &String| side + letters.width(text) <= width;
         let ends = |frame: usize| self.labels(frame, angles).into_iter().find(fits).map(|text| letters.width(&text));
@@ -184,7 +174,7 @@ impl Annotation {
     #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "only programs print notes"))]
     pub(crate) fn cut_title(&self, size: [usize; 2], frame: usize) -> Option<String> {
         let letters = Letters::new(layout::line(size));
-        let title = self.placed_title(&letters, size[0] as f64, (frame, None)).filter(|_| has_time(size))?;
+        let title = self.placed_title(&letters, size[0] as f64, frame, None).filter(|_| has_time(size))?;
         Some(title.text).filter(|text| *text != self.title)
     }
 

@@ -21,7 +21,7 @@ impl Letters {
     }
 
     /// The same letters in another size.
-    pub(super) fn of_size(&self, size: f64) -> Self {
+    pub(super) fn with_size(&self, size: f64) -> Self {
         Self { font: self.font.font.clone().into_scaled(size as f32), size }
     }
 

@@ -26,7 +26,7 @@ impl Title {
         let (full, room) = (letters.width(title), (right - left).max(0.0));
         let least = (LEAST * letters.size).max(LEAST_LINE).min(letters.size);
         let size = if full <= room { letters.size } else { (0.999 * letters.size * room / full).max(least) };
-        let smaller = letters.of_size(size);
+        let smaller = letters.with_size(size);
         let text = shortened(title, |text| smaller.width(text) <= room);
         let is_cut = text != title;
         if text.is_empty() || is_cut && text.chars().count() <= FEW {
@@ -39,7 +39,7 @@ impl Title {
 
     /// Writes the title at a height.
     pub(super) fn write(&self, canvas: &mut Canvas<'_>, y: f64) -> bool {
-        canvas.write_in(&canvas.letters.of_size(self.size), &self.text, [self.middle, y])
+        canvas.write_in(&canvas.letters.with_size(self.size), &self.text, [self.middle, y])
     }
 }
 

@@ -8,7 +8,7 @@ use crate::base::decimal;
 use crate::base::grid::{Grid, Region};
 use crate::view::camera::Camera;
 
-/// What an axis means.
+/// The meaning of an axis.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AxisLabels {
     /// Its name.

@@ -1,4 +1,4 @@
-//! What a page must know to show its pictures: colours, times and texts.
+//! The data that a page needs to show its pictures: colours, times and texts.
 
 use crate::base::error::Result;
 use crate::colour::{NAMES, Norm, Rgb, Scale, TransferFunction};

@@ -40,7 +40,7 @@ struct Head {
     step: f32,
     /// Bytes of each coded plane; 0 for a plane of zeros.
     lengths: Vec<usize>,
-    /// Bytes that tell which numbers are missing; 0 if none is.
+    /// Bytes that mark missing numbers; 0 if none is missing.
     missing: usize,
 }
 
@@ -49,9 +49,9 @@ impl Planes {
         Self { size, numbers, log, planes: Vec::new() }
     }
 
-    /// Adds a picture. The numbers of a pixel are side by side in it.
-    pub(crate) fn push(&mut self, picture: &[f32], of: impl Fn(f32) -> f32) {
-        let plane = |n| picture.iter().skip(n).step_by(self.numbers).map(|value| of(*value)).collect();
+    /// Adds a picture. The numbers of a pixel are side by side in it; `number` gives what is kept of each.
+    pub(crate) fn push(&mut self, picture: &[f32], number: impl Fn(f32) -> f32) {
+        let plane = |n| picture.iter().skip(n).step_by(self.numbers).map(|value| number(*value)).collect();
         let planes: Vec<Vec<f32>> = (0..self.numbers).map(plane).collect();
         self.planes.extend(planes);
     }
@@ -111,11 +111,11 @@ impl Planes {
     /// Whether each number of a pixel is known in some picture.
     fn is_known(&self) -> Vec<Vec<bool>> {
         let pixels = self.size[0] * self.size[1];
-        let of_number = |n: usize| {
+        let is_known = |n: usize| {
             let planes = || self.planes.iter().skip(n).step_by(self.numbers);
             (0..pixels).map(|at| planes().any(|plane| !plane[at].is_nan())).collect()
         };
-        (0..self.numbers).map(of_number).collect()
+        (0..self.numbers).map(is_known).collect()
     }
 
     /// Gives missing numbers the last number of their pixel, else its next one, else 0: these change least over time.
@@ -141,7 +141,7 @@ fn fill_from(planes: &mut [Vec<f32>], n: usize, from: usize) {
 }
 
 /// The orthonormal Haar transform over time of each number, in place: sums of 2, 4, 8, ... pictures stay at the first of
-/// these, and differences at the first of the second half. What has no partner stays as it is.
+/// these, and differences at the first of the second half. A picture without a partner is not changed.
 fn haar(planes: &mut [Vec<f32>], numbers: usize) {
     let mut half = numbers;
     while half < planes.len() {
@@ -331,10 +331,10 @@ mod tests {
         found
     }
 
-    fn planes(pictures: usize, numbers: usize, of: impl Fn(usize, usize) -> f32) -> Planes {
+    fn planes(pictures: usize, numbers: usize, number: impl Fn(usize, usize) -> f32) -> Planes {
         let mut planes = Planes::new([7, 5], numbers, false);
         for t in 0..pictures {
-            planes.push(&(0..35 * numbers).map(|at| of(t, at)).collect::<Vec<_>>(), |value| value);
+            planes.push(&(0..35 * numbers).map(|at| number(t, at)).collect::<Vec<_>>(), |value| value);
         }
         planes
     }
@@ -360,8 +360,8 @@ mod tests {
 
     #[test]
     fn codes_of_any_size_come_back() {
-        let of = |t: usize, at: usize| if (at + t).is_multiple_of(2) { 1e30 } else { -1e30 };
-        let planes = planes(2, 1, of);
+        let number = |t: usize, at: usize| if (at + t).is_multiple_of(2) { 1e30 } else { -1e30 };
+        let planes = planes(2, 1, number);
         let found = decoded(&planes.clone().coded(1e-3).expect("a block"));
         for (a, b) in planes.planes.iter().flatten().zip(found.iter().flatten()) {
             assert!((a - b).abs() < 1e24, "{a} {b}");

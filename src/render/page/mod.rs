@@ -24,7 +24,7 @@ const SCRIPT: &str = concat!(
     include_str!("web/player.js"),
     include_str!("web/stored.js"),
 );
-/// What a page needs besides, if it asks a server for pictures.
+/// The scripts for pages that ask a server for pictures.
 #[cfg(feature = "view")]
 const LIVE: &str = concat!(
     include_str!("web/camera.js"),
@@ -43,7 +43,7 @@ const START: &str = include_str!("web/start.js");
 const BLOCKS: &str = "{blocks}";
 
 /// Begins a page that holds its pictures.
-pub(crate) fn begin(out: &mut dyn Write, (generator, nonce): (&str, &str), about: &About) -> io::Result<()> {
+pub(crate) fn begin(out: &mut dyn Write, generator: &str, nonce: &str, about: &About) -> io::Result<()> {
     let (start, _) = parts();
     let title = if about.title.is_empty() { &about.values } else { &about.title };
     let title = if title.is_empty() { "wavesplat" } else { title };
@@ -85,11 +85,13 @@ fn in_script(json: &str) -> String {
 /// Writes a block of `count` pictures of a sequence, from the picture `first` on.
 pub(crate) fn write_block(
     out: &mut dyn Write,
-    (sequence, first, count): (usize, usize, usize),
+    sequence: usize,
+    first: usize,
+    count: usize,
     block: &[u8],
 ) -> io::Result<()> {
-    let place = format!(r#"data-sequence="{sequence}" data-first="{first}" data-count="{count}""#);
-    writeln!(out, r#"<script type="text/plain" class="block" {place}>{}</script>"#, BASE64.encode(block))
+    let attributes = format!(r#"data-sequence="{sequence}" data-first="{first}" data-count="{count}""#);
+    writeln!(out, r#"<script type="text/plain" class="block" {attributes}>{}</script>"#, BASE64.encode(block))
 }
 
 /// Ends the page.

@@ -7,7 +7,7 @@
 //! splat_weights    the weights of a view
 //! reconstruct      planes to pixels: inverse transform, division, certificate
 //! bands            rows of all pictures of a batch
-//! partial_sums     what a part of the voxels adds to pictures
+//! partial_sums     the contribution of some of the voxels to pictures
 //! ```
 
 pub(super) mod weight_sums;

@@ -90,7 +90,7 @@ fn clipped_projection(scene: &dyn Scene, config: &RenderConfig) -> Result<Projec
     Ok(Projection { setups: setups.into_iter().map(|setup| ViewSetup { clip, ..setup }).collect() })
 }
 
-/// Where sums go, and what tells of them.
+/// The sink for partial sums, and its progress.
 struct PartialOutput<'a, 's> {
     sink: &'a mut PartialSumSink<'s>,
     report: &'a mut RenderReport,

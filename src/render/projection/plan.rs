@@ -49,7 +49,7 @@ pub(super) struct BandPlan {
     pub(super) room: DoubleRoom,
 }
 
-/// What is stored for every pixel until the sink takes it.
+/// The numbers stored for every pixel until the sink takes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kept {
     /// Its value, and perhaps its error.

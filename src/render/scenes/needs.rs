@@ -1,4 +1,4 @@
-//! What the blocks of a file need in memory, found once for all batches.
+//! The memory that the blocks of a file need, found once for all batches.
 
 use super::batch_plan::{SplatSource, error_planes};
 use crate::file::CoefficientFile;

@@ -132,7 +132,7 @@ fn not_started(path: &Path, error: io::Error) -> Error {
     Error::io(path, "starting ffmpeg", error)
 }
 
-/// The last of what a stream holds.
+/// The last bytes of a stream.
 fn last_of(mut stream: impl Read) -> String {
     let (mut all, mut some) = (Vec::new(), [0; 4096]);
     while let Ok(read) = stream.read(&mut some) {

@@ -18,7 +18,7 @@ impl Page {
     pub(super) fn new(mut out: Output, config: &SinkConfig) -> Result<Self> {
         let encoder = PageEncoder::new(config.clone())?;
         let nonce = page::nonce(encoder.about());
-        let begun = page::begin(&mut out, (&config.provenance.software, &nonce), encoder.about());
+        let begun = page::begin(&mut out, &config.provenance.software, &nonce, encoder.about());
         begun.map_err(|e| Error::io(out.path(), "writing", e))?;
         Ok(Self { out, encoder, nonce })
     }
@@ -26,13 +26,13 @@ impl Page {
     /// Adds a picture, and writes the block that it completes.
     pub(super) fn picture(&mut self, rendered: &Rendered<'_>) -> Result<()> {
         let (step, out) = (self.encoder.step(), &mut self.out);
-        self.encoder.picture(rendered, &mut |place, planes| write(out, place, planes, step))
+        self.encoder.picture(rendered, &mut |block, planes| write(out, block, planes, step))
     }
 
     /// Writes the rest, and gives the file its final name.
     pub(super) fn finish(mut self) -> Result<()> {
         let (step, out) = (self.encoder.step(), &mut self.out);
-        self.encoder.rest(&mut |place, planes| write(out, place, planes, step))?;
+        self.encoder.rest(&mut |block, planes| write(out, block, planes, step))?;
         let ended = page::end(&mut self.out, &self.nonce, self.encoder.about());
         ended.map_err(|e| Error::io(self.out.path(), "writing", e))?;
         self.out.commit()
@@ -40,12 +40,8 @@ impl Page {
 }
 
 /// Writes a block of pictures.
-fn write(
-    out: &mut Output,
-    BlockOfFrames { sequence, first, count }: BlockOfFrames,
-    planes: Planes,
-    step: f32,
-) -> Result<()> {
-    let written = planes.coded(step).and_then(|block| page::write_block(out, (sequence, first, count), &block));
+fn write(out: &mut Output, block: BlockOfFrames, planes: Planes, step: f32) -> Result<()> {
+    let BlockOfFrames { sequence, first, count } = block;
+    let written = planes.coded(step).and_then(|bytes| page::write_block(out, sequence, first, count, &bytes));
     written.map_err(|e| Error::io(out.path(), "writing", e))
 }

@@ -100,9 +100,9 @@ impl PageEncoder {
         if count == 0 {
             return Ok(());
         }
-        let place = BlockOfFrames { sequence: self.sequence, first: given[self.sequence], count };
+        let block = BlockOfFrames { sequence: self.sequence, first: given[self.sequence], count };
         given[self.sequence] += count;
-        give(place, waiting)
+        give(block, waiting)
     }
 
     fn push(&mut self, picture: Picture<'_>) {
@@ -129,7 +129,7 @@ impl PageEncoder {
     fn backdrop(&self, view: &ViewReport) -> Result<Option<String>> {
         let (size, background) = (self.config.size, self.config.colours.background());
         let mut pixels = vec![background; size[0] * size[1]];
-        self.annotation.draw_still(&mut pixels, (size, background), view);
+        self.annotation.draw_still(&mut pixels, size, background, view);
         if pixels.iter().all(|pixel| *pixel == background) {
             return Ok(None);
         }

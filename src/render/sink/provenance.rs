@@ -122,17 +122,17 @@ impl SinkConfig {
 
     fn texts(&self, shown: &[(usize, usize)], views: &[ViewReport]) -> Vec<(String, String)> {
         let Ok(Value::Object(all)) = serde_json::to_value(self.provenance.as_ref()) else { return Vec::new() };
-        let of_run = all.iter().filter(|(key, _)| !["software", "frames", "times", "dates"].contains(&key.as_str()));
-        let mut texts: Vec<(&str, String)> = of_run.map(|(key, value)| (key.as_str(), text(value))).collect();
-        texts.extend(of_views(views, shown));
-        texts.extend(self.of_frames(shown));
+        let shared = all.iter().filter(|(key, _)| !["software", "frames", "times", "dates"].contains(&key.as_str()));
+        let mut texts: Vec<(&str, String)> = shared.map(|(key, value)| (key.as_str(), text(value))).collect();
+        texts.extend(view_texts(views, shown));
+        texts.extend(self.frame_texts(shown));
         texts.retain(|(_, text)| !text.is_empty());
         let named = texts.into_iter().map(|(key, text)| (format!("{PREFIX}{key}"), text));
         std::iter::once(("Software".into(), self.provenance.software.clone())).chain(named).collect()
     }
 
     /// The frame numbers, and the time and date of a single frame.
-    fn of_frames(&self, shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
+    fn frame_texts(&self, shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
         let mut frames: Vec<usize> = shown.iter().map(|(_, frame)| *frame).collect();
         frames.dedup();
         let at = self.provenance.frames.iter().position(|frame| [*frame] == frames[..]);
@@ -143,26 +143,26 @@ impl SinkConfig {
 }
 
 /// The settings of the views that are shown. If views differ in a setting, their values follow one another.
-fn of_views(views: &[ViewReport], shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
+fn view_texts(views: &[ViewReport], shown: &[(usize, usize)]) -> Vec<(&'static str, String)> {
     let mut numbers: Vec<usize> = shown.iter().map(|(view, _)| *view).collect();
     numbers.dedup();
     let views: Vec<&ViewReport> = numbers.iter().filter_map(|n| views.get(*n)).collect();
-    let of = |say: &dyn Fn(&ViewReport) -> String| {
+    let setting = |say: &dyn Fn(&ViewReport) -> String| {
         let said: Vec<String> = views.iter().map(|view| say(view)).collect();
         let alike = said.windows(2).all(|pair| pair[0] == pair[1]);
         if alike { said.first().cloned().unwrap_or_default() } else { said.join(" ") }
     };
     vec![
-        ("view", of(&|view| joined(&[view.azimuth, view.elevation]))),
-        ("roll", of(&|view| view.roll.to_string())),
-        ("scale", of(&|view| view.scale.to_string())),
-        ("center", of(&|view| joined(&view.center))),
-        ("slices", of(&|view| view.slices.map_or_else(String::new, |slices| slices.to_string()))),
-        ("cells", of(&|view| view.cells.map_or_else(String::new, |cells| cells.to_string()))),
-        ("splat_method", of(&|view| view.method.into())),
+        ("view", setting(&|view| joined(&[view.azimuth, view.elevation]))),
+        ("roll", setting(&|view| view.roll.to_string())),
+        ("scale", setting(&|view| view.scale.to_string())),
+        ("center", setting(&|view| joined(&view.center))),
+        ("slices", setting(&|view| view.slices.map_or_else(String::new, |slices| slices.to_string()))),
+        ("cells", setting(&|view| view.cells.map_or_else(String::new, |cells| cells.to_string()))),
+        ("splat_method", setting(&|view| view.method.into())),
         (
             "stated_splat_error",
-            of(&|view| {
+            setting(&|view| {
                 Some(view.stated_splat_error).filter(|e| !e.is_nan()).map_or_else(String::new, |e| e.to_string())
             }),
         ),

@@ -29,7 +29,7 @@ impl Sheet {
 
     pub(super) fn picture(&mut self, config: &SinkConfig, rendered: &Rendered<'_>, picture: Picture<'_>) {
         let ([width, height], [across, down]) = (config.size, self.size);
-        let (kind, columns) = (Samples::of(config), across / width);
+        let (kind, columns) = (Samples::new(config), across / width);
         if self.samples.is_empty() {
             self.samples = kind.pixel(config.colours.background()).repeat(across * down);
             self.texts = config.texts_of_all(rendered);

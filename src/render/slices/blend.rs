@@ -175,7 +175,7 @@ fn add_shaded(
     }
 }
 
-/// What the table has for sixteen values.
+/// The table's entries for sixteen values.
 struct Looked {
     /// Red, green and blue times the opacity, and minus the opacity.
     lights: [[f32; 4]; GROUP],

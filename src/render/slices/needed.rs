@@ -5,7 +5,7 @@ use super::view::SlicedView;
 use crate::base::grid::BlockGrid;
 use crate::render::batches::{Selection, Units};
 
-/// What is known about the blocks of a batch before any block is read.
+/// Facts about the blocks of a batch, known before any block is read.
 pub(super) struct Known<'a> {
     view: &'a SlicedView,
     blocks: BlockGrid,

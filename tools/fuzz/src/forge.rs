@@ -13,7 +13,7 @@ const PART: usize = 56;
 /// The totals of a window's blocks.
 const SUMS: usize = 64;
 
-/// What is changed in a file. All but the first are fields of the file, before sums and checksums are computed.
+/// A change to a file. All but the first change fields of the file, before sums and checksums are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum EditTarget {
     /// Parts of a block: omitted or duplicated.

@@ -23,7 +23,7 @@ fn advised(words: String, remedy: Option<&Remedy>) -> String {
     }
 }
 
-/// Advice; none for what Python does otherwise.
+/// Advice; `None` for remedies that Python handles otherwise.
 fn advice(remedy: &Remedy) -> Option<String> {
     Some(match remedy {
         Remedy::Set("axes") => "axes=... changes this".into(),

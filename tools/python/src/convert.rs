@@ -1,4 +1,4 @@
-//! Conversions of what Python holds.
+//! Conversions of Python's arrays.
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
 use crate::advice;
@@ -18,7 +18,7 @@ use wavesplat::file::resume::{self, IfUnfinished};
 use wavesplat::formats::{self, NamedArrays};
 use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
 
-/// What is asked of a conversion, and where it goes.
+/// The request for a conversion, and its output.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Conversion {
@@ -57,10 +57,10 @@ impl Conversion {
     }
 }
 
-/// The report of a conversion as JSON, nothing if the file was complete already; and what is worth knowing.
+/// The report of a conversion as JSON, `None` if the file was complete already; and notes.
 type Converted = (Option<String>, Vec<String>);
 
-/// What frames are, and where.
+/// The meaning and the positions of frames.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Layout {
@@ -97,7 +97,7 @@ pub(crate) fn convert_frames(
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Chosen {
-    /// What the arrays are called in messages.
+    /// The name of the arrays in messages.
     source: String,
     variable: Option<String>,
     axes: Option<String>,

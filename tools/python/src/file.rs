@@ -170,7 +170,7 @@ impl File {
         setting(self.file.metadata(), name).map(String::from)
     }
 
-    /// What is promised, as JSON.
+    /// The error bound, as JSON.
     fn promise(&self) -> String {
         serde_json::to_string(&BoundReport::from_metadata(self.file.metadata())).unwrap_or_default()
     }
@@ -181,7 +181,7 @@ impl File {
         self.file.metadata().windows.iter().map(|window| window.reached).fold(0.0, f64::max)
     }
 
-    /// What the source says beside its samples; None if nothing is kept.
+    /// The source's description; None if the file has none.
     fn description<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let description = self.file.description().map_err(raised)?;
         description.map(|description| described::to_python(py, &description)).transpose()

@@ -25,7 +25,7 @@ pub(crate) struct Caller {
 }
 
 impl Caller {
-    /// What a call returns.
+    /// The result of a call.
     ///
     /// # Errors
     /// The words of the exception, which [`run`] raises again; or that the work is cancelled.

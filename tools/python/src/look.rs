@@ -27,7 +27,7 @@ pub(crate) fn render(
     render_from(py, &session, request, output, report)
 }
 
-/// Makes the pictures of a request from what is open.
+/// Makes the pictures of a request from open inputs.
 pub(crate) fn render_from(
     py: Python<'_>,
     session: &Session,

@@ -13,7 +13,7 @@ pub(super) struct Figure {
     pub(super) title: String,
     /// The source of the numbers.
     pub(super) note: String,
-    /// What the axes are, with units.
+    /// The names of the axes, with units.
     pub(super) x: String,
     pub(super) y: String,
     /// How curves look.
@@ -112,7 +112,7 @@ impl Figure {
     }
 }
 
-/// What is less cannot be told from 0 and is drawn at the edge.
+/// Smaller values look like 0 and are drawn at the edge.
 const LEAST: f64 = 1e-12;
 
 /// The title, the note, and a sample of each line with its name.

@@ -13,7 +13,7 @@ use wavesplat::base::error::{Error, Result};
 /// The name of the file.
 const NAME: &str = "points.jsonl";
 
-/// The open file and what it holds.
+/// The open file and its contents.
 #[derive(Debug)]
 pub(super) struct Journal {
     path: PathBuf,

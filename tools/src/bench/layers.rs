@@ -51,7 +51,7 @@ pub struct Results {
     /// By what, where and when.
     #[serde(flatten)]
     pub made: Provenance,
-    /// What was measured.
+    /// The measured archives.
     pub data: Vec<Data>,
     /// Every archive at every tolerance by both measures, after the whole file.
     pub rows: Vec<Row>,
@@ -70,9 +70,9 @@ pub struct Row {
     pub bytes: f64,
     /// Time of the pictures, as a share of that of the whole file's.
     pub time: f64,
-    /// What no pixel is further off than.
+    /// The certified error of pixels.
     pub certified: f64,
-    /// What the root mean square is expected to be.
+    /// The expected root mean square error.
     pub expected: f64,
     /// The largest error.
     pub largest: f64,

@@ -11,7 +11,7 @@
 //! textbook   the textbook form of the conventional method
 //! point      the recorded measurements
 //! journal    finished points on disk, so that a run can be interrupted
-//! sanity     what must hold of every point, on any machine
+//! sanity     checks of every point that hold on any machine
 //! process    runs a measurement in its own process
 //! stages     the measured stages: conversion, and rendering of two views
 //! measure    measures a group: stages in turns (A B A B ...), and the check of every sample

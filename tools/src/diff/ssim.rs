@@ -54,7 +54,7 @@ fn of_channel(a: Picture, b: Picture, scope: Scope, height: usize, channel: usiz
     mean(rows)
 }
 
-/// The mean of what sums and counts stand for.
+/// The mean from sums and counts.
 fn mean(sums: impl IntoIterator<Item = (f64, u64)>) -> Option<f64> {
     let (sum, count) = sums.into_iter().fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1));
     (count > 0).then(|| sum / count as f64)

@@ -17,7 +17,7 @@ fn places(original: &Original) -> Vec<u64> {
     all.chain([0, 1, 32, 128, len - 128, len - 1, len, len + 1, 1 << 32, 1 << 63, u64::MAX - 63, u64::MAX]).collect()
 }
 
-/// The bytes at a place, as far as the file holds them.
+/// The bytes of the file at a place; fewer at its end.
 fn at(file: &[u8], place: u64, len: u32) -> &[u8] {
     let from = usize::try_from(place).map_or(file.len(), |place| place.min(file.len()));
     &file[from..(from + len as usize).min(file.len())]

@@ -49,7 +49,7 @@ fn run_one(args: &ConvertArgs) -> Result<()> {
     report(done, request.bound, &args.output, &args.common)
 }
 
-/// Reports what a conversion did, or what it left.
+/// Reports a finished conversion, or the unfinished file that a failed one left.
 pub(crate) fn report(
     done: std::result::Result<ConvertReport, Failure>,
     bound: Bound,
@@ -76,7 +76,7 @@ struct Reported<'a> {
     warnings: Vec<Warning<'a>>,
 }
 
-/// What is worth knowing, and what to type.
+/// A note, with the options that help.
 #[derive(Serialize)]
 struct Warning<'a> {
     text: &'a str,

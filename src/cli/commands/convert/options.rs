@@ -216,7 +216,7 @@ enum MissingName {
 }
 
 impl ConvertArgs {
-    /// What these options ask for.
+    /// The request that these options make.
     pub(super) fn request(&self) -> Result<ConvertRequest> {
         let colours = self.transfer_function.as_deref().map(|name| open_colours("--transfer-function", name));
         Ok(ConvertRequest {

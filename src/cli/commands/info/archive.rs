@@ -144,8 +144,8 @@ impl<'a> Info<'a> {
             return String::new();
         };
         let unit = self.units.map_or(String::new(), |unit| format!(" {unit}"));
-        let of = format!("range {lo:.4e} to {hi:.4e}{unit}, by {blocks} blocks of {windows} windows");
-        let mut text = format!("estimate   {of}; lost: voxels that change by less than the error\n");
+        let basis = format!("range {lo:.4e} to {hi:.4e}{unit}, by {blocks} blocks of {windows} windows");
+        let mut text = format!("estimate   {basis}; lost: voxels that change by less than the error\n");
         let [tolerance, bytes, ratio, error, lost] = ["tolerance", "bytes", "smaller", "error", "lost"];
         let _ = writeln!(text, "{tolerance:>20} {bytes:>13} {ratio:>9} {error:>10} {lost:>6}");
         for Estimate { tolerance, bytes, ratio, error, lost, .. } in &self.estimates {

@@ -176,8 +176,8 @@ impl Info {
         text
     }
 
-    fn largest(&self, of: fn(&WindowReport) -> f64) -> f64 {
-        self.windows.iter().map(of).fold(0.0, f64::max)
+    fn largest(&self, value: fn(&WindowReport) -> f64) -> f64 {
+        self.windows.iter().map(value).fold(0.0, f64::max)
     }
 }
 

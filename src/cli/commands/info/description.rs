@@ -59,15 +59,15 @@ fn axis_line(description: &Description, along: usize) -> Option<String> {
     Some(format!("{shown_name}: {first} to {last} {}{irregular}", unit.unwrap_or_default()))
 }
 
-fn attributes(of: &str, all: &[Attribute], verbose: bool) -> String {
+fn attributes(owner: &str, all: &[Attribute], verbose: bool) -> String {
     let all: Vec<&Attribute> = all.iter().filter(|attribute| attribute.name != NIFTI_HEADER).collect();
-    let shown_of = if verbose { all.len() } else { all.len().min(MOST_ATTRIBUTES) };
+    let count = if verbose { all.len() } else { all.len().min(MOST_ATTRIBUTES) };
     let mut text = String::new();
-    for attribute in &all[..shown_of] {
-        let _ = writeln!(text, "{of:<10} {} = {}", attribute.name, shown(&attribute.value));
+    for attribute in &all[..count] {
+        let _ = writeln!(text, "{owner:<10} {} = {}", attribute.name, shown(&attribute.value));
     }
-    if shown_of < all.len() {
-        let _ = writeln!(text, "           and {} more attributes; -v shows all", all.len() - shown_of);
+    if count < all.len() {
+        let _ = writeln!(text, "           and {} more attributes; -v shows all", all.len() - count);
     }
     text
 }

@@ -38,13 +38,13 @@ pub(super) struct EncodedArray {
 }
 
 impl EncodedArray {
-    /// Where its samples are, if they are as they are.
+    /// Where its samples are, if they are stored raw.
     pub(super) fn plain(&self) -> Option<u64> {
         let plain = self.form == Form::Raw && !self.compressed;
         plain.then(|| self.start + self.count.size() as u64)
     }
 
-    /// Checks that the array says to have as many bytes as it should, and that the file has these.
+    /// Checks that the array states the expected number of bytes, and that the file has them.
     pub(super) fn check(&self, file: &FileBytes) -> Result<()> {
         let path = file.path();
         let refused = |e: io::Error| match e.raw_os_error() {

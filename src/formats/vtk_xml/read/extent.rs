@@ -1,4 +1,4 @@
-//! Boxes of a lattice by their first and last points, and whether some make up a whole.
+//! Boxes of a lattice by their first and last points, and whether boxes cover a larger one.
 
 use crate::source::Parsed;
 

@@ -1,4 +1,4 @@
-//! Arrays of a file that belong to no point or cell. They are kept as they are.
+//! Arrays of a file that belong to no point or cell. They are kept unchanged.
 
 use super::header::VtiArray;
 use super::image::VtiFile;

@@ -1,4 +1,4 @@
-//! What the XML of a `.vti` or a `.vtr` says, or of a list of such pieces.
+//! The XML of a `.vti`, a `.vtr`, or a list of such pieces.
 
 use super::extent::Extent;
 use crate::formats::shared::association::Association;
@@ -34,7 +34,7 @@ pub(super) struct VtiPiece {
     pub(super) coordinates: Vec<VtiArray>,
 }
 
-/// The file, as it is written; what it leaves out has the value that VTK gives it.
+/// The file as written, with VTK's defaults for what is left out.
 #[derive(Debug)]
 pub(super) struct VtiHeader {
     /// Whether its points are at coordinates of their own, not on a lattice.
@@ -56,7 +56,7 @@ pub(super) struct VtiHeader {
     declared: Vec<VtiArray>,
     /// Names of the active arrays, those of points first.
     pub(super) scalars: Vec<(Association, String)>,
-    /// The time that the file is of.
+    /// The time of the file.
     pub(super) time: Option<VtiArray>,
     /// Other arrays that belong to no point or cell, and how many tuples each has.
     pub(super) fields: Vec<(VtiArray, usize)>,
@@ -65,7 +65,7 @@ pub(super) struct VtiHeader {
     inside: Inside,
 }
 
-/// What arrays that come are of.
+/// Whether the next arrays are of points or cells.
 #[derive(Debug, Clone, Copy)]
 enum Inside {
     Nothing,
@@ -96,7 +96,7 @@ impl VtiHeader {
         }
     }
 
-    /// The arrays that every piece has, as the first of them has them, or the list of pieces says.
+    /// The arrays that every piece has, from the first piece or from the list of pieces.
     pub(super) fn arrays(&self) -> &[VtiArray] {
         let first = self.pieces.iter().find(|piece| !piece.extent.is_empty()).or(self.pieces.first());
         match first {

@@ -13,7 +13,7 @@ use crate::formats::vtk_xml::layout::TYPES;
 use std::io::Read;
 use std::path::Path;
 
-/// A file, and what its XML says.
+/// A file, and its XML.
 pub(super) struct VtiFile {
     pub(super) file: FileBytes,
     pub(super) header: VtiHeader,
@@ -67,7 +67,7 @@ impl VtiFile {
         start.ok_or_else(|| refused("its array's offset is too large"))
     }
 
-    /// The time that the file is of, if it says so as a floating-point number.
+    /// The time of the file, if it is given as a floating-point number.
     pub(super) fn time(&self) -> Result<Option<f64>> {
         let Some(array) = &self.header.time else { return Ok(None) };
         let float = TYPES.stored(array.ty.as_str()).filter(|ty| ty.sample().is_float());

@@ -28,7 +28,7 @@ use header::{VtiArray, VtiHeader};
 use image::VtiFile;
 use std::path::Path;
 
-/// Reads the XML of one file, and of those that it lists, and checks that the array is all there.
+/// Reads the XML of one file and of the files that it lists, and checks that the array is complete.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
     let image = VtiFile::open(path)?;
     let header = &image.header;

@@ -1,4 +1,4 @@
-//! The pieces of an image, in one file or in files of their own, as one frame.
+//! The pieces of an image, in one file or in one file each, as one frame.
 
 use super::ChosenArray;
 use super::encoded::EncodedArray;
@@ -13,7 +13,7 @@ use std::path::Path;
 
 const MOST: usize = 1 << 14; // pieces: each is compared with every other one
 
-/// Where the array of an image is, checked to be all there, and the time that its files say.
+/// Where the array of an image is, checked to be complete, and the time that its files give.
 pub(super) fn part(image: &VtiFile, wanted: &ChosenArray<'_>) -> Result<(Part, Option<f64>)> {
     let path = image.file.path();
     let refused = |e| Error::input(path, e);
@@ -93,7 +93,7 @@ fn listed(image: &VtiFile, wanted: &ChosenArray<'_>) -> Result<LocatedPieces> {
     all.ok_or_else(|| Error::input(image.file.path(), "lists no piece that holds anything"))
 }
 
-/// The array in a piece; none if it has no cell of the whole.
+/// The array in a piece; `None` if the piece has no cell of the image.
 fn locate(image: &VtiFile, piece: &VtiPiece, wanted: &ChosenArray<'_>) -> Result<Option<LocatedPiece>> {
     let refused = |e| Error::input(image.file.path(), e);
     let (extent, whole) = (piece.extent, &wanted.whole);

@@ -49,10 +49,10 @@ pub(super) fn coordinates(image: &VtiFile) -> Result<[Vec<f64>; 3]> {
     Ok(joined.try_into().unwrap_or_default())
 }
 
-/// Coordinates of some points that follow one another, and which the first of them is.
+/// Coordinates of consecutive points, and the index of the first point.
 type Run = (usize, Vec<f64>);
 
-/// Adds those of a piece; those of an axis only if others do not have them.
+/// Adds the coordinates of a piece, unless other pieces have given those of an axis.
 fn add(image: &VtiFile, piece: &VtiPiece, whole: &Extent, runs: &mut [Vec<Run>; 3]) -> Result<()> {
     let refused = |e| Error::input(image.file.path(), e);
     let points = piece.extent.points().map_err(refused)?;

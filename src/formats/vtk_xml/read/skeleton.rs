@@ -25,7 +25,7 @@ pub(super) struct Skeleton {
 }
 
 impl Skeleton {
-    /// Reads a file as far as it is XML.
+    /// Reads the XML of a file, up to the appended data.
     pub(super) fn read(file: &FileBytes) -> Result<Self> {
         let mut skeleton = Self::default();
         let (mut at, mut piece) = (0, vec![0; PIECE]);
@@ -83,7 +83,7 @@ impl Skeleton {
         };
     }
 
-    /// What is left of the text.
+    /// The rest of the text.
     pub(super) fn text(&self) -> &[u8] {
         &self.text
     }

@@ -47,7 +47,7 @@ pub(in crate::render) struct SplattedView<'a> {
     pub(in crate::render) clip: &'a Region,
     pub(in crate::render) blocks: BlockGrid,
     pub(in crate::render) camera: &'a Camera,
-    /// What a voxel would add to pixels without a lattice.
+    /// The exact contribution of a voxel to pixels, without a lattice.
     pub(in crate::render) footprint: &'a Footprint,
 }
 

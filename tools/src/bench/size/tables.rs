@@ -15,7 +15,7 @@ samples to bytes in memory, *values* back to samples in one array, *codes* to co
 ✗ marks a missed target, or a missed bound, even if only by rounding.
 ";
 
-/// The mark of what is missed.
+/// The mark of a missed target.
 const MISSED: &str = " ✗";
 
 pub(super) fn markdown(results: &Results) -> String {
@@ -122,7 +122,7 @@ fn summary(verdicts: &[Verdict]) -> String {
 const CODES_HEAD: [&str; 6] =
     ["data", "tolerance", "scheme", "codes per sample", "outliers", "samples of exact blocks"];
 
-/// Nonzero codes, and what is stored exactly and so is no code.
+/// Nonzero codes, and the samples that are stored exactly, without codes.
 fn codes(results: &Results) -> String {
     let mut text = format!("\n## Nonzero codes\n\n{}", head(3, &CODES_HEAD.map(Into::into)));
     for row in &results.rows {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// A number of a scheme compared with another coder's, and its target.
 pub(super) struct Target {
-    /// What is compared.
+    /// The quantity that is compared.
     pub(super) name: &'static str,
     /// The other coder.
     against: &'static str,
@@ -98,9 +98,9 @@ pub struct Verdict {
     pub scheme: String,
     /// The name of the target.
     pub target: String,
-    /// What was reached.
+    /// The result.
     pub value: f64,
-    /// What was wanted, in words.
+    /// The target, in words.
     pub wanted: String,
     /// Whether it was reached.
     pub met: bool,

@@ -15,7 +15,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
 
-/// What both programs make.
+/// The output that both programs make.
 struct Case {
     name: &'static str,
     /// From the coefficient file, or from frames.

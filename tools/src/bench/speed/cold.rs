@@ -1,4 +1,4 @@
-//! What the system reports about a process and its files: cache, storage and memory.
+//! The system's reports about a process and its files: cache, storage and memory.
 
 use super::measured::Measured;
 use std::fs::{self, File};

@@ -54,7 +54,7 @@ const ZOOMS: [f64; 3] = [2.0, 4.0, 10.0];
 pub(super) const WHOLE: &str = "whole";
 pub(super) const FINEST: &str = "whole finest";
 
-/// The key of what depends on a file, a spacing, or neither.
+/// A key for measurements that depend on a file, a spacing, or neither.
 pub(super) fn key(what: &str, file: Option<&Coded>, spacing: Option<f64>, threads: usize) -> String {
     let file = file.map_or(String::new(), |f| format!(" {}", f.name()));
     let spacing = spacing.map_or(String::new(), |s| format!(" {s} px"));

@@ -23,7 +23,7 @@ pub struct Results {
     pub archives: Vec<Archive>,
     /// The names of archives that are still to be measured: of a run that was interrupted.
     pub left: Vec<String>,
-    /// Every target, and what stands beside.
+    /// Every target, and results for comparison.
     pub rows: Vec<Row>,
 }
 
@@ -41,15 +41,15 @@ pub struct Archive {
 /// A target, and the number that was reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// What is compared.
+    /// The quantity that is compared.
     pub target: String,
     /// The name of the archive.
     pub data: String,
     /// The file, the spacing and the number of threads.
     pub case: String,
-    /// What was reached; none: not measured.
+    /// The result; `None` if it was not measured.
     pub value: Option<f64>,
-    /// What is wanted, in words; none: nothing, it stands beside what is.
+    /// The target, in words; `None` for a result shown only for comparison.
     pub wanted: Option<String>,
     /// Whether it was reached, where both are there.
     pub met: Option<bool>,

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::mapped::{Access, FileBytes};
 
-/// What a process is to do, with how many threads.
+/// The task of a process, and its number of threads.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::bench) struct Task {
     pub(super) threads: usize,
