@@ -8,8 +8,8 @@ use super::values::ModeName;
 use crate::base::error::{Error, Result};
 use crate::base::output::Output;
 use crate::base::report::report_text;
+use crate::render::RenderReport;
 use crate::render::sink::{Provenance, is_ours};
-use crate::render::{Mode, RenderReport};
 use serde::Serialize;
 use std::io::Write;
 
@@ -27,12 +27,14 @@ pub(super) struct Reported<'a> {
     pub(super) file_bytes: Option<u64>,
 }
 
-/// The unit of the progress of pictures.
-pub(super) fn unit(mode: &Mode) -> &'static str {
-    match mode {
-        Mode::Projection | Mode::Planes { .. } => "pictures",
-        Mode::Composite { .. } | Mode::Iso { .. } | Mode::Mip { .. } => "slices",
-    }
+/// The result of a run.
+pub struct Outcome {
+    /// The report, as JSON.
+    pub report: String,
+    /// Whether the run wrote data to standard output.
+    pub is_on_stdout: bool,
+    /// An error if something was left out, such as damaged blocks. It comes after the report.
+    pub end: Result<()>,
 }
 
 /// Prints notes on the errors of pictures.

@@ -2,7 +2,8 @@
 
 use super::partial::{add_partials, imply_setup, write_partial};
 use super::plan::Plan;
-use super::report::{Reported, note_errors, summary, unit, written};
+use super::plan::modes::unit;
+use super::report::{Outcome, Reported, note_errors, summary, written};
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::series::write_series;
@@ -10,20 +11,10 @@ use super::session::Session;
 use crate::base::error::Result;
 use crate::render::render;
 
-/// The result of a run.
-pub struct Outcome {
-    /// The report, as JSON.
-    pub report: String,
-    /// Whether the run wrote data to standard output.
-    pub is_on_stdout: bool,
-    /// An error if something was left out, such as damaged blocks. It comes after the report.
-    pub end: Result<()>,
-}
-
 /// Writes what a request asks for.
 ///
 /// # Errors
-/// Those of opening, rendering and writing; [`Error::Usage`](crate::Error::Usage) names options of `wavesplat-render`.
+/// Those of opening, rendering and writing; [`Error::Setting`](crate::Error::Setting) names fields of the request.
 pub fn run(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Outcome> {
     if request.is_for_series() {
         write_series(session, request, reporter)

@@ -1,6 +1,5 @@
 //! The inputs of pictures, kept open for many pictures.
 
-use super::plan::opened::FRAMES_HINT;
 use super::reporter::Reporter;
 use crate::base::address::{is_address, public_name};
 use crate::base::error::{Error, Result};
@@ -147,6 +146,9 @@ fn kept(
     *open = Some(file.clone());
     Ok(file)
 }
+
+/// What to do with frames instead of opening them as a coefficient file.
+pub(super) const FRAMES_HINT: &str = "convert frames first, or render them with `method` direct";
 
 /// Adds a hint to the error for a file without coefficients.
 fn hint_at_frames(path: &Path, error: Error) -> Error {

@@ -1,7 +1,7 @@
 //! The axes of all voxels: their names, units and coordinates, and positions along them in voxels.
 
-use super::units::in_letters;
-use crate::base::description::{Attribute, Description, Values, coordinates};
+use super::units::{attribute_text, in_letters};
+use crate::base::description::{Description, coordinates};
 use crate::base::error::{Error, Result};
 use crate::base::grid::Grid;
 use crate::file::CoefficientFile;
@@ -148,17 +148,9 @@ fn named(description: &Description, along: usize) -> (Vec<String>, String) {
     };
     let name = description.dimensions[axis.dimension as usize].name.clone();
     let own = description.variables.iter().find(|v| v.name == name && v.dimensions == [axis.dimension]);
-    let attribute = |key| own.and_then(|own| text(&own.attributes, key));
+    let attribute = |key| own.and_then(|own| attribute_text(&own.attributes, key));
     let unit = attribute("units").unwrap_or_default();
     (std::iter::once(name).chain(attribute("standard_name")).collect(), unit)
-}
-
-/// The text of an attribute.
-pub(crate) fn text(attributes: &[Attribute], name: &str) -> Option<String> {
-    match &attributes.iter().find(|attribute| attribute.name == name)?.value {
-        Values::Texts(texts) => texts.first().map(|text| text.trim().to_string()),
-        _ => None,
-    }
 }
 
 #[cfg(test)]

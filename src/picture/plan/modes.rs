@@ -21,6 +21,14 @@ pub(in crate::picture) fn mode_name(request: &PictureRequest) -> ModeName {
     }
 }
 
+/// The unit of the progress of pictures.
+pub(in crate::picture) fn unit(mode: &Mode) -> &'static str {
+    match mode {
+        Mode::Projection | Mode::Planes { .. } => "pictures",
+        Mode::Composite { .. } | Mode::Iso { .. } | Mode::Mip { .. } => "slices",
+    }
+}
+
 /// An error if a field does not apply to the mode. `is_direct` is whether frames are splatted.
 pub(in crate::picture) fn check(request: &PictureRequest, is_direct: bool) -> Result<()> {
     let mode = mode_name(request);

@@ -15,7 +15,7 @@ use crate::colour::TransferFunction;
 use crate::file::{CoefficientFile, time_labels};
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
-use crate::picture::session::Session;
+use crate::picture::session::{FRAMES_HINT, Session};
 use crate::picture::values::{Detail, Exaggeration};
 use crate::render::annotate::Annotation;
 use crate::render::{CoefficientScene, FrameScene, Scene, SplatSource};
@@ -162,5 +162,3 @@ fn refuse_for_frames(session: &Session, request: &PictureRequest) -> Result<()> 
     }
     Ok(())
 }
-
-pub(in crate::picture) const FRAMES_HINT: &str = "convert frames first, or render them with `method` direct";

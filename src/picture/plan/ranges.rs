@@ -1,11 +1,11 @@
 //! The default range of colours, taken from small pictures of an overview.
 
+use super::modes::unit;
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
 use crate::base::progress::{Progress, Silent};
 use crate::base::sample::SampleType;
 use crate::colour::{Clear, Common, Distribution, Norm, TransferFunction};
-use crate::picture::report::unit;
 use crate::picture::reporter::Reporter;
 use crate::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
 use crate::render::{check, render, stride};

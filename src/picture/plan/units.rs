@@ -1,18 +1,26 @@
 //! Names and units as people write them.
 
-use super::axes;
+use crate::base::description::{Attribute, Values};
 use crate::base::error::Result;
 use crate::file::{CoefficientFile, setting};
 
 /// The name and the unit of a file's values.
 pub(in crate::picture) fn values_of(file: &CoefficientFile) -> Result<String> {
     let (m, description) = (file.metadata(), file.description()?);
-    let text = |name: &str| description.as_ref().and_then(|all| axes::text(&all.attributes, name));
+    let text = |name: &str| description.as_ref().and_then(|all| attribute_text(&all.attributes, name));
     let name = text("long_name").or_else(|| text("standard_name").map(|name| name.replace('_', " ")));
     let name = name.or_else(|| m.variable.clone()).unwrap_or_default();
     let unit = setting(m, "units").map(ToString::to_string).or_else(|| text("units")).unwrap_or_default();
     let unit = in_letters(&unit);
     Ok(if unit.is_empty() || name.is_empty() { name + &unit } else { format!("{name} ({unit})") })
+}
+
+/// The text of an attribute.
+pub(in crate::picture) fn attribute_text(attributes: &[Attribute], name: &str) -> Option<String> {
+    match &attributes.iter().find(|attribute| attribute.name == name)?.value {
+        Values::Texts(texts) => texts.first().map(|text| text.trim().to_string()),
+        _ => None,
+    }
 }
 
 /// A unit as people write it: °C, and m s⁻¹ for "m s-1".

@@ -5,9 +5,9 @@ mod table;
 
 use super::plan::axes::Axes;
 use super::plan::config::frames_of;
+use super::report::Outcome;
 use super::reporter::Reporter;
 use super::request::PictureRequest;
-use super::run::Outcome;
 use super::session::Session;
 use super::values::PointSpec;
 use crate::base::error::{Error, Result};

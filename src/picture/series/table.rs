@@ -5,7 +5,7 @@ use super::chart::{Band, Chart, Line};
 use crate::base::error::Result;
 use crate::base::time_labels::TimeLabels;
 use crate::file::{CoefficientFile, setting, time_labels};
-use crate::picture::plan::axes::text;
+use crate::picture::plan::units::attribute_text;
 use std::fmt::Write as _;
 
 /// The names and units of samples and times.
@@ -18,7 +18,7 @@ pub(super) struct Named {
 impl Named {
     pub(super) fn from_file(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
-        let described = file.description()?.and_then(|all| text(&all.attributes, "units"));
+        let described = file.description()?.and_then(|all| attribute_text(&all.attributes, "units"));
         let unit = setting(m, "units").map(ToString::to_string).or(described).unwrap_or_default();
         Ok(Self { variable: m.variable.clone().unwrap_or_else(|| "value".into()), unit, times: time_labels(m) })
     }
