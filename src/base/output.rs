@@ -56,9 +56,11 @@ const BETWEEN_SYNCS: Duration = Duration::from_secs(2);
 const LOCK_WAIT: Duration = Duration::from_secs(1);
 
 /// The unfinished files of this process, and whether each is to be kept, for [`abandon`].
-static PARTS: Mutex<Vec<(PathBuf, Arc<AtomicBool>)>> = Mutex::new(Vec::new());
+static PARTS: Mutex<UnfinishedFiles> = Mutex::new(Vec::new());
 
-fn parts() -> MutexGuard<'static, Vec<(PathBuf, Arc<AtomicBool>)>> {
+type UnfinishedFiles = Vec<(PathBuf, Arc<AtomicBool>)>;
+
+fn parts() -> MutexGuard<'static, UnfinishedFiles> {
     PARTS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -203,9 +205,9 @@ impl Output {
 }
 
 impl Part {
-    fn new(path: PathBuf, replace: bool) -> Self {
+    fn new(path: PathBuf, replace: bool, mut parts: MutexGuard<'_, UnfinishedFiles>) -> Self {
         let keep = Arc::new(AtomicBool::new(false));
-        parts().push((path.clone(), keep.clone()));
+        parts.push((path.clone(), keep.clone()));
         Self { path, replace, resumable: false, keep, synced: Instant::now() }
     }
 
@@ -223,11 +225,13 @@ impl Part {
         let failed = |e| Error::io(path, "creating", e);
         let asked = Instant::now();
         loop {
+            let parts = parts(); // `abandon` must know every file that is there
             let file =
                 File::options().read(true).write(true).create(true).truncate(false).open(&part).map_err(failed)?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) if asked.elapsed() < LOCK_WAIT => {
+                    drop(parts);
                     std::thread::sleep(LOCK_WAIT / 20);
                     continue;
                 }
@@ -255,7 +259,7 @@ impl Part {
                         let mode = replaced.permissions().mode() | 0o200; // it must be writable
                         file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
                     }
-                    return Ok((file, Self::new(part, replace)));
+                    return Ok((file, Self::new(part, replace, parts)));
                 }
                 (false, _) => {}
             }
