@@ -33,6 +33,7 @@ enum Target {
     /// A device or a pipe, written directly.
     Special(BufWriter<File>),
     /// The bytes that are committed go to the receiver.
+    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "only the viewer needs it"))]
     Memory(Vec<u8>, Sender<Vec<u8>>),
     File(Part, BufWriter<File>), // in this order: the file is removed before it is unlocked
 }
@@ -98,6 +99,7 @@ impl Output {
     }
 
     /// Writes to memory. The bytes come from the receiver when the output is committed. `name` stands for it in messages.
+    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "only the viewer needs it"))]
     pub(crate) fn to_memory(name: &str) -> (Self, Receiver<Vec<u8>>) {
         let (committed, bytes) = channel();
         (Self { path: name.into(), target: Target::Memory(Vec::new(), committed) }, bytes)

@@ -12,7 +12,9 @@ mod report;
 mod partial;
 mod series;
 mod run;
+#[cfg(feature = "view")]
 mod view_request;
+#[cfg(feature = "view")]
 mod viewer;
 
 pub use report::Outcome;
@@ -20,9 +22,13 @@ pub use reporter::{Caller, Reporter};
 pub use request::{PictureRequest, option};
 pub use run::run;
 pub use session::{Inputs, Session};
+#[cfg(feature = "view")]
 pub use view_request::ViewRequest;
+#[cfg(feature = "view")]
 pub use viewer::{Saved, ViewerSession};
 
 pub use plan::named_colours::{colours_of_source, open_colours};
+#[cfg(feature = "cli")]
 pub(crate) use request::exclude;
+#[cfg(feature = "cli")]
 pub(crate) use session::is_coefficient_name;

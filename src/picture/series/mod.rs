@@ -90,6 +90,7 @@ pub(super) fn write_series(session: &Session, request: &PictureRequest, reporter
 }
 
 /// Time series as lines of comma-separated values.
+#[cfg_attr(not(feature = "view"), allow(dead_code, reason = "only the viewer needs it"))]
 pub(super) fn series_csv(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Vec<u8>> {
     Ok(AllSeries::read(session, request, reporter)?.table.csv().into_bytes())
 }

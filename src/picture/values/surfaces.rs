@@ -73,6 +73,7 @@ fn opacity(text: &str) -> Result<f64, String> {
 
 impl SurfaceList {
     /// Surfaces at values, in default colours; `None` if there is no value.
+    #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "only the viewer needs it"))]
     pub(crate) fn at_values(values: &[f64]) -> Option<Self> {
         let named = |value: &f64| Named { at: At::Value(*value), colour: None, opacity: None };
         (!values.is_empty()).then(|| Self(values.iter().map(named).collect()))
