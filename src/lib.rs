@@ -92,7 +92,7 @@
 //! # From a request to a pixel
 //!
 //! A [`picture::PictureRequest`] says in plain data what is asked for. Options (`cli/render/args.rs`), the page of the viewer
-//! (`picture/view_request.rs`) and Python give one. [`picture::run`] resolves it against the open inputs of a
+//! (`picture/view_request.rs`) and Python give one. [`picture::run()`] resolves it against the open inputs of a
 //! [`picture::Session`]: `Plan::new` (`picture/plan/mod.rs`) finds frames, views, colours, ranges and files. Then:
 //!
 //! 1. `CoefficientFile::open` (`file/coefficient_file.rs`) reads the directory of blocks.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 use std::path::PathBuf;
 use wavesplat_format::{Basis, Bound};
 
-/// The request for a conversion. [`run`](super::run) completes it from the frames.
+/// The request for a conversion. [`run`](super::run()) completes it from the frames.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConvertRequest {

@@ -11,7 +11,7 @@ use std::path::Path;
 /// Converts all frames of `source` into the coefficient file `path`.
 ///
 /// The file gets its name once it is complete and all its checksums hold; a file that had this name is replaced then. For
-/// progress, other outputs or interrupted conversions see [`super::run`].
+/// progress, other outputs or interrupted conversions see [`super::run()`].
 ///
 /// # Errors
 /// As [`convert`], and [`Error::Io`](crate::Error::Io) where the file cannot be written.

@@ -1,7 +1,7 @@
 //! From a request to pictures, partial sums or time series: what `wavesplat-render`, the viewer and Python share.
 //!
-//! A [`PictureRequest`] says what is asked for, in plain data. A [`Session`] holds the inputs of pictures. [`run`]
-//! resolves the request against it ([`plan`]), renders and writes.
+//! A [`PictureRequest`] says what is asked for, in plain data. A [`Session`] holds the inputs of pictures. [`run()`]
+//! resolves the request against it (`plan`), renders and writes.
 
 mod reporter;
 pub mod values;

@@ -135,7 +135,7 @@ pub struct RenderConfig {
     pub mode: Mode,
     /// The views, at least one; all have the same picture size.
     pub views: Vec<View>,
-    /// The kernel of every voxel. Default: [`Kernel::of_grid`].
+    /// The kernel of every voxel. Default: [`Kernel::for_grid`].
     pub kernel: Kernel,
     /// The quantity that a pixel of a projection shows. Default: the mean.
     pub quantity: Quantity,
