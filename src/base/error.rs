@@ -2,6 +2,7 @@
 
 pub use super::remedy::{Note, Remedy};
 
+use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -40,10 +41,12 @@ pub enum Error {
         source: io::Error,
     },
     /// A field of a configuration, or an argument, is invalid or cannot be met. Give it another value.
-    #[error("{setting}: {problem}")]
+    #[error("{setting}{value}: {problem}")]
     Setting {
         /// Name of the field, like `memory` or `splat_error`.
         setting: &'static str,
+        /// A space and its value, or nothing.
+        value: Box<str>,
         /// What is wrong with its value.
         problem: String,
         /// What helps besides another value.
@@ -122,7 +125,12 @@ impl Error {
     /// An error about a field of a configuration, by its name.
     pub fn setting(setting: &'static str, problem: impl Into<Note>) -> Self {
         let Note { text: problem, remedy } = problem.into();
-        Self::Setting { setting, problem, remedy }
+        Self::Setting { setting, value: "".into(), problem, remedy }
+    }
+
+    /// An error about the value of a field, which it repeats.
+    pub fn value(setting: &'static str, value: impl Display, problem: impl Into<String>) -> Self {
+        Self::Setting { setting, value: format!(" {value}").into(), problem: problem.into(), remedy: None }
     }
 
     /// An error about a path.

@@ -8,8 +8,8 @@ use std::borrow::Cow;
 /// The text of an error, with a tip if it has a remedy.
 pub fn error_text(error: &Error, command: &Command) -> String {
     let text = match error {
-        Error::Setting { setting, problem, .. } => {
-            format!("error: {}: {}", option(setting, command), with_options(problem, command))
+        Error::Setting { setting, value, problem, .. } => {
+            format!("error: {}{value}: {}", option(setting, command), with_options(problem, command))
         }
         other => format!("error: {}", with_options(&other.to_string(), command)),
     };

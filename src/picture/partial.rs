@@ -133,9 +133,10 @@ fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
     let instead = "render them whole, perhaps with `lod`, or each shard of time by itself: its frames are whole";
     let what = match mode_name(request) {
         ModeName::Projection if request.error == Limit::Expected && request.tolerance.is_some() => {
-            return Err(Error::setting(
+            return Err(Error::value(
                 "error",
-                "expected weighs all blocks of a picture, and a part has some; take certified",
+                "expected",
+                "weighs all blocks of a picture, and a part has some; take certified",
             ));
         }
         ModeName::Projection => return Ok(()),

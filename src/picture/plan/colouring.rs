@@ -194,5 +194,5 @@ fn suggested_opacities(
     let volume: f64 = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).product();
     let path = volume.cbrt() / modes::opacity_unit(request, grid);
     let points = samples.opacities(colours.range(), path);
-    colours.with_opacity(&points).map_err(|what| Error::setting("opacity", format!("auto: {what}")))
+    colours.with_opacity(&points).map_err(|what| Error::value("opacity", "auto", what))
 }

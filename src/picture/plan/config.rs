@@ -87,7 +87,11 @@ fn allowed_error(request: &PictureRequest, tolerance: f64, file: Option<&Metadat
     if allowed < reached && request.error == Limit::Certified {
         let least = reached / (range.1 - range.0);
         let what = "the samples of the file are up to";
-        return Err(Error::setting("tolerance", format!("{tolerance:e}: {what} {least:.3e} of its range off")));
+        return Err(Error::value(
+            "tolerance",
+            format!("{tolerance:e}"),
+            format!("{what} {least:.3e} of its range off"),
+        ));
     }
     Ok(allowed)
 }

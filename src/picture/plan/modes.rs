@@ -57,7 +57,7 @@ pub(in crate::picture) fn check(request: &PictureRequest, is_direct: bool) -> Re
 /// An error if slices are missing, or the mode takes none.
 pub(in crate::picture) fn check_slices(request: &PictureRequest) -> Result<()> {
     match (request.slice.is_empty(), request.mode) {
-        (true, Some(ModeName::Slice)) => Err(Error::setting("mode", "slice: needs `slice`, like `slice` z=0.5")),
+        (true, Some(ModeName::Slice)) => Err(Error::value("mode", "slice", "needs `slice`, like `slice` z=0.5")),
         (true, _) | (false, None | Some(ModeName::Slice | ModeName::Composite)) => Ok(()),
         (false, Some(mode)) => {
             Err(Error::setting("slice", format!("needs `mode` slice or composite, not {}", mode.name())))

@@ -9,7 +9,7 @@ use crate::source::{FrameSource, value_range};
 /// Opens the colours that a field names.
 pub fn open_colours(field: &'static str, name: &str) -> Result<TransferFunction> {
     TransferFunction::open(name).map_err(|error| match error {
-        Error::Path { path, problem, .. } => Error::setting(field, format!("{}: {problem}", path.display())),
+        Error::Path { path, problem, .. } => Error::value(field, path.display(), problem),
         other => other,
     })
 }
@@ -43,7 +43,7 @@ pub fn colours_of_source(
     let all = || {
         if is_piped {
             let what = "standard input is read once: give `range` LO,HI, the values of the first and the last colour";
-            return Err(Error::setting("transfer_function", format!("{name}: {what}")));
+            return Err(Error::value("transfer_function", name, what));
         }
         let progress = reporter.progress("values", "frames");
         let (lo, hi) = value_range(source, missing_value, progress.as_ref())?.unwrap_or((0.0, 1.0));

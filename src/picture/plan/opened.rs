@@ -157,8 +157,8 @@ fn refuse_for_frames(session: &Session, request: &PictureRequest) -> Result<()> 
         return Err(Error::setting("inputs", format!("takes one coefficient file; {FRAMES_HINT}")));
     }
     if session.paths() == [PathBuf::from(STANDARD)] {
-        let what = "direct reads frames more than once, so they cannot come from standard input";
-        return Err(Error::setting("method", what));
+        let what = "reads frames more than once, so they cannot come from standard input";
+        return Err(Error::value("method", "direct", what));
     }
     Ok(())
 }

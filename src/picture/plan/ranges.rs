@@ -334,7 +334,7 @@ impl Ranges {
         let (lo, hi) = self.values;
         if norm == Norm::Log {
             let least =
-                self.positive.ok_or_else(|| Error::setting("norm", "log: no value is above 0; give `norm` linear"))?;
+                self.positive.ok_or_else(|| Error::value("norm", "log", "no value is above 0; give `norm` linear"))?;
             return Ok((least.max(hi * DECADES), hi));
         }
         Ok(if lo < hi { map.suitable(at_least_noticeable((lo, hi))) } else { (lo, hi) })

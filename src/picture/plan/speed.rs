@@ -28,7 +28,7 @@ pub(in crate::picture) fn frames_per_second(
     if !(SLOWEST..=FASTEST).contains(&fps) {
         let sensible = 25.0 / steps * (last - first);
         let what = format!("would show {fps:.3e} frames per second, not {SLOWEST} to {FASTEST}");
-        return Err(Error::setting("speed", format!("{speed} {what}; `speed` {sensible:.3e} shows 25")));
+        return Err(Error::value("speed", speed, format!("{what}; `speed` {sensible:.3e} shows 25")));
     }
     Ok(fps)
 }

@@ -72,7 +72,7 @@ impl AllTargets {
     fn check_depth(&self, depth: Depth) -> Result<()> {
         if depth == Depth::Sixteen && !self.all().any(|targets| targets.format.is_png()) {
             let what = "is for png, apng and sheet; gray16 always has 16 bits, npy and exr hold floats";
-            return Err(Error::setting("depth", format!("16 {what}")));
+            return Err(Error::value("depth", 16, what));
         }
         Ok(())
     }
