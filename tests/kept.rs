@@ -25,7 +25,8 @@ fn files() -> Vec<Stored> {
     let file = |basis| {
         let usual = ConvertConfig::new(1e-3);
         let coding = SchemeConstraint { basis: Some(basis), ..usual.coding };
-        let config = ConvertConfig { coding, block: Some(4), window: 8, ..usual };
+        let window = if basis == Basis::Multi { 9 } else { 8 };
+        let config = ConvertConfig { coding, block: Some(4), window, ..usual };
         stored(&mut source.clone(), &config)
     };
     [Basis::Haar, Basis::Multi, Basis::Samples].map(file).into()
