@@ -7,7 +7,7 @@ mod reporter;
 pub mod values;
 mod request;
 mod session;
-pub(crate) mod plan;
+mod plan;
 mod report;
 mod partial;
 mod series;
@@ -29,6 +29,6 @@ pub use viewer::{Saved, ViewerSession};
 
 pub use plan::named_colours::{colours_of_source, open_colours};
 #[cfg(feature = "cli")]
-pub(crate) use request::exclude;
+pub(crate) use request::{MOST_VIEWS, check_fps, check_speed, exclude, is_field};
 #[cfg(feature = "cli")]
 pub(crate) use session::is_coefficient_name;

@@ -216,7 +216,17 @@ impl PictureRequest {
         if let Some((a, b)) = pairs.into_iter().find(|(a, b)| exclude(a, b)) {
             return Err(wrong(format!("`{a}` cannot be used with `{b}`")));
         }
-        serde_json::from_value(given.into()).map_err(wrong)
+        let request: Self = serde_json::from_value(given.into()).map_err(wrong)?;
+        request.check().map(|()| request)
+    }
+
+    /// An error unless all numbers are within their limits.
+    fn check(&self) -> Result<()> {
+        if !(1..=MOST_VIEWS).contains(&self.orbit) {
+            return Err(Error::setting("orbit", format!("takes 1 to {MOST_VIEWS} views, not {}", self.orbit)));
+        }
+        check_fps(self.fps).map_err(|what| Error::setting("fps", what))?;
+        self.speed.map_or(Ok(()), |speed| check_speed(speed).map_err(|what| Error::setting("speed", what)))
     }
 
     /// The options of `wavesplat-render` that ask for the same.
@@ -254,6 +264,24 @@ fn wrong(what: impl Display) -> Error {
     Error::setting("request", what.to_string())
 }
 
+/// The most views of an orbit.
+pub(crate) const MOST_VIEWS: u32 = 3600;
+
+/// The least and the largest number of frames per second.
+pub(crate) const SLOWEST: f64 = 0.02;
+pub(crate) const FASTEST: f64 = 1000.0;
+
+/// The number that a field takes instead, unless these are frames per second of a movie.
+pub(crate) fn check_fps(fps: f64) -> std::result::Result<(), String> {
+    let is_sound = (SLOWEST..=FASTEST).contains(&fps);
+    if is_sound { Ok(()) } else { Err(format!("a number from {SLOWEST} to {FASTEST}")) }
+}
+
+/// The number that a field takes instead, unless this is a speed of time.
+pub(crate) fn check_speed(speed: f64) -> std::result::Result<(), String> {
+    if speed.is_finite() && speed > 0.0 { Ok(()) } else { Err("a number above 0".into()) }
+}
+
 /// Fields for how finished pictures are coloured and written.
 const FINISH: [&str; 12] = [
     "colormap",
@@ -270,7 +298,8 @@ const FINISH: [&str; 12] = [
     "sidecar",
 ];
 
-fn is_field(name: &str) -> bool {
+/// Whether a request has a field of this name.
+pub(crate) fn is_field(name: &str) -> bool {
     static FIELDS: LazyLock<Map<String, Value>> = LazyLock::new(|| PictureRequest::default().fields());
     FIELDS.contains_key(name)
 }
@@ -281,9 +310,6 @@ pub(crate) fn exclude(a: &str, b: &str) -> bool {
 }
 
 fn excludes(field: &str, other: &str) -> bool {
-    if !is_field(other) {
-        return false; // inputs and how they are read go with everything
-    }
     match field {
         "lod" | "skip_damaged" => ["error_image", "tolerance"].contains(&other),
         "fast" => ["splat_error", "error_image"].contains(&other),
@@ -291,13 +317,18 @@ fn excludes(field: &str, other: &str) -> bool {
         "key_frames" => ["view", "orbit", "over_time"].contains(&other),
         "speed" => other == "fps",
         "probe" | "probe_region" => {
-            !["probe", "probe_region", "frames", "force", "missing_value", "skip_damaged"].contains(&other)
+            is_other(other, &["probe", "probe_region", "frames", "force", "missing_value", "skip_damaged"])
         }
         "partial" => FINISH.contains(&other) || other == "error_image",
         // A sum takes from its parts what else they have.
-        "sum" => !FINISH.contains(&other) && !["partial", "frames", "force", "annotate", "title"].contains(&other),
+        "sum" => !FINISH.contains(&other) && is_other(other, &["partial", "frames", "force", "annotate", "title"]),
         _ => false,
     }
+}
+
+/// Whether a name is that of a field which is not among some. Inputs and how they are read are no fields.
+fn is_other(name: &str, fields: &[&str]) -> bool {
+    !fields.contains(&name) && is_field(name)
 }
 
 /// The name of the option of a field.
@@ -313,5 +344,57 @@ fn words_of(name: &str, value: &Value) -> Vec<String> {
         Value::Array(all) => all.iter().flat_map(|value| words_of(name, value)).collect(),
         Value::String(text) => vec![format!("{option}={text}")],
         other => vec![format!("{option}={other}")],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_takes_the_texts_of_options_and_gives_them_back() {
+        let json = r#"{"view": ["top", "10,-20.5"], "size": "60x40", "frames": "2:9:3", "range": "-1.0,2.5", "depth": 16,
+            "lod": 1, "iso": "0.5,40%:ff0000", "slice": ["z=#3"], "annotate": "box,axes", "shade": true}"#;
+        let request = PictureRequest::from_json(json).expect("a request");
+        let words = [
+            "--annotate=box,axes",
+            "--depth=16",
+            "--frames=2:9:3",
+            "--iso=0.5,40%:ff0000",
+            "--lod=1",
+            "--range=-1.0,2.5",
+            "--shade",
+            "--size=60x40",
+            "--slice=z=#3",
+            "--view=180,90",
+            "--view=10,-20.5",
+        ];
+        let mut all = request.words();
+        all.sort();
+        let mut expected = words.map(String::from);
+        expected.sort();
+        assert_eq!(all, expected);
+        assert_eq!(PictureRequest::from_json("{}").expect("all defaults"), PictureRequest::default());
+    }
+
+    #[test]
+    fn json_that_is_no_request_is_refused_with_the_name_of_the_field() {
+        for (json, named) in [
+            ("", "request"),
+            ("[]", "request"),
+            (r#"{"nonsense": 1}"#, "nonsense"),
+            (r#"{"output": "/tmp/a"}"#, "output"),
+            (r#"{"size": "large"}"#, "size"),
+            (r#"{"orbit": 0}"#, "orbit"),
+            (r#"{"orbit": 3601}"#, "orbit"),
+            (r#"{"orbit": -1}"#, "orbit"),
+            (r#"{"fps": 0}"#, "fps"),
+            (r#"{"speed": -1}"#, "speed"),
+            (r#"{"lod": 1, "tolerance": 0.1}"#, "tolerance"),
+            (r#"{"probe": ["0,0,0"], "colormap": "grey"}"#, "colormap"),
+        ] {
+            let error = PictureRequest::from_json(json).expect_err(json).to_string();
+            assert!(error.contains(named), "{json}: {error}");
+        }
     }
 }

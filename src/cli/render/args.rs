@@ -8,7 +8,7 @@ use crate::base::values::{FrameList, RegionSpec, Triple, Whole};
 use crate::cli::choice::choice;
 use crate::cli::{CommonArgs, InputArgs, RemoteArgs, share};
 use crate::picture::values::{Detail, Exaggeration, ViewAngles};
-use crate::picture::{Inputs, PictureRequest, Session};
+use crate::picture::{Inputs, MOST_VIEWS, PictureRequest, Session};
 use crate::render::sink::{Depth, PictureFormat};
 use crate::render::{Limit, Quantity, SplatSource};
 use clap::Parser;
@@ -62,7 +62,7 @@ pub struct Cli {
     pub(super) view: Vec<ViewAngles>,
     /// Render N views for each view, evenly spaced around the vertical axis, starting with it; all use the smallest of
     /// their scales
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = "View")]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_VIEWS)), help_heading = "View")]
     pub(super) orbit: u32,
     /// Turn the picture counter-clockwise by this many degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "View")]

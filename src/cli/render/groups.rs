@@ -4,9 +4,8 @@
 use crate::base::values::{Pair, RegionSpec};
 use crate::cli::choice::choice;
 use crate::colour::{Norm, Opacities};
-use crate::picture::PictureRequest;
-use crate::picture::plan::speed::{FASTEST, SLOWEST};
 use crate::picture::values::{ClearSpec, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme};
+use crate::picture::{PictureRequest, check_fps, check_speed};
 use crate::render::annotate::Parts;
 use clap::Args;
 use std::path::PathBuf;
@@ -230,11 +229,11 @@ impl PartialArgs {
 }
 
 fn parse_fps(text: &str) -> Result<f64, String> {
-    let within = |fps: &f64| (SLOWEST..=FASTEST).contains(fps);
-    text.parse().ok().filter(within).ok_or_else(|| format!("a number from {SLOWEST} to {FASTEST}"))
+    let fps = text.parse().unwrap_or(f64::NAN);
+    check_fps(fps).map(|()| fps)
 }
 
 fn parse_speed(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|speed: &f64| speed.is_finite() && *speed > 0.0);
-    number.ok_or_else(|| "a number above 0".into())
+    let speed = text.parse().unwrap_or(f64::NAN);
+    check_speed(speed).map(|()| speed)
 }

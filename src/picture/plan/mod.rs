@@ -16,7 +16,7 @@ mod value_colours;
 pub(super) mod colouring;
 pub(super) mod opened;
 pub(super) mod provenance;
-pub(crate) mod speed;
+mod speed;
 pub(super) mod sinks;
 
 use super::reporter::Reporter;

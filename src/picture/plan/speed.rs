@@ -2,12 +2,8 @@
 
 use crate::base::error::{Error, Result};
 use crate::base::time_labels::TimeLabels;
-use crate::picture::request::PictureRequest;
+use crate::picture::request::{FASTEST, PictureRequest, SLOWEST};
 use crate::render::RenderConfig;
-
-/// The least and the largest number of frames per second.
-pub(crate) const SLOWEST: f64 = 0.02;
-pub(crate) const FASTEST: f64 = 1000.0;
 
 /// The frames per second of movies: as asked for, or by the speed of the data's time.
 pub(in crate::picture) fn frames_per_second(
