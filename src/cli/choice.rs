@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     let value = |(name, _, help): &(&'static str, T, &'static str)| match *help {
         "" => PossibleValue::new(*name),
-        help => PossibleValue::new(*name).help(messages::of_picture(help)),
+        help => PossibleValue::new(*name).help(messages::picture_text(help)),
     };
     PossibleValuesParser::new(T::CHOICES.iter().map(value)).try_map(|name| T::named(&name))
 }

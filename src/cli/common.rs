@@ -97,11 +97,11 @@ impl CommonArgs {
 
 impl Reporter for CommonArgs {
     fn note(&self, text: Arguments<'_>) {
-        Self::note(self, messages::of_picture(&text.to_string()));
+        Self::note(self, messages::picture_text(&text.to_string()));
     }
 
     fn detail(&self, text: Arguments<'_>) {
-        Self::detail(self, messages::of_picture(&text.to_string()));
+        Self::detail(self, messages::picture_text(&text.to_string()));
     }
 
     fn note_source(&self, note: &Note) {

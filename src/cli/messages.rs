@@ -2,6 +2,8 @@
 
 use crate::base::error::{Error, Note, Remedy};
 use crate::formats::extensions;
+#[cfg(feature = "cli")]
+use crate::picture::is_field;
 use clap::Command;
 use std::borrow::Cow;
 
@@ -16,11 +18,10 @@ pub fn error_text(error: &Error, command: &Command) -> String {
     error.remedy().map(|remedy| format!("{text}\n  tip: {}", advice(&remedy))).unwrap_or(text)
 }
 
-/// The text of a note about pictures: with options in place of the fields that it has in backquotes.
+/// A text about pictures, with options in place of the fields that it has in backquotes.
 #[cfg(feature = "cli")]
-pub(super) fn of_picture(text: &str) -> String {
-    let worded = |(n, part): (usize, &str)| if n % 2 == 1 { format!("--{}", name(part)) } else { part.into() };
-    text.split('`').enumerate().map(worded).collect()
+pub(super) fn picture_text(text: &str) -> String {
+    worded(text, |quoted| is_field(quoted).then(|| format!("--{}", name(quoted))))
 }
 
 /// The text of a note, with advice if it has a remedy.
@@ -58,12 +59,23 @@ fn long_option(setting: &str, command: &Command) -> Option<String> {
     is_option.then(|| format!("--{name}"))
 }
 
-/// A text with options in place of the fields in backquotes. Words that are no fields stay.
+/// A text with the program's options in place of the fields that it has in backquotes.
 fn with_options(text: &str, command: &Command) -> String {
+    worded(text, |quoted| long_option(quoted, command))
+}
+
+/// A text with options in place of words in backquotes. A word without an option stays.
+fn worded(text: &str, option: impl Fn(&str) -> Option<String>) -> String {
     let parts: Vec<&str> = text.split('`').collect();
-    let option = |quoted: &str| long_option(quoted, command).unwrap_or_else(|| format!("`{quoted}`"));
-    let worded = |(n, part): (usize, &&str)| if n % 2 == 1 { option(part) } else { (*part).to_string() };
-    if parts.len().is_multiple_of(2) { text.into() } else { parts.iter().enumerate().map(worded).collect() }
+    if parts.len().is_multiple_of(2) {
+        return text.into();
+    }
+    let mut all = String::new();
+    for (n, part) in parts.into_iter().enumerate() {
+        let is_quoted = n % 2 == 1;
+        all += &if is_quoted { option(part).unwrap_or_else(|| format!("`{part}`")) } else { part.into() };
+    }
+    all
 }
 
 /// Advice that names options of the programs.
