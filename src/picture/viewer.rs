@@ -177,29 +177,28 @@ impl ViewerSession {
             .map_or_else(|| Histogram { range: None, counts: Vec::new(), surface: None }, Histogram::new))
     }
 
-    /// The file of the pictures of a request.
+    /// The file of the pictures of a request, made in memory; ffmpeg alone needs a file for a movie.
     pub fn save(&self, view: &ViewRequest, saved: Saved, work: &CancelToken) -> Result<Vec<u8>> {
+        if saved != Saved::Movie {
+            let (out, bytes) = Output::to_memory(saved.name());
+            self.write(view, saved, out, work)?;
+            return Ok(bytes.try_recv().unwrap_or_default());
+        }
+        let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
+        let path = folder.path().join(saved.name());
+        self.write(view, saved, Output::create(&path, true)?, work)?;
+        std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
+    }
+
+    /// Writes the pictures of a request.
+    fn write(&self, view: &ViewRequest, saved: Saved, out: Output, work: &CancelToken) -> Result<()> {
         let output = saved.name().into();
         let request = PictureRequest { output, certify: false, ..view.applied_to(&self.base) };
         let mut plan = Plan::new(&self.session, &request, &Caller(work))?;
-        let shown = plan.config.shown();
-        let config = SinkConfig { shown, ..plan.sinks(&request).config()? };
-        let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
-        let movie = folder.path().join(saved.name()); // ffmpeg needs a file
-        let (out, bytes) = match saved {
-            Saved::Movie => (Output::create(&movie, true)?, None),
-            Saved::Picture | Saved::Page => {
-                let (out, bytes) = Output::to_memory(saved.name());
-                (out, Some(bytes))
-            }
-        };
+        let config = SinkConfig { shown: plan.config.shown(), ..plan.sinks(&request).config()? };
         let mut sink = Sink::to_output(out, config)?;
         render(plan.scene.as_mut(), &plan.config, work, &mut |rendered| sink.picture(&rendered))?;
-        sink.finish()?;
-        match bytes {
-            Some(bytes) => Ok(bytes.try_recv().unwrap_or_default()),
-            None => std::fs::read(&movie).map_err(|e| Error::io(&movie, "reading", e)),
-        }
+        sink.finish()
     }
 
     /// The command that draws a request.
