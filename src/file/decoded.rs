@@ -43,8 +43,8 @@ enum Decoded {
     Samples(Arc<Buffer<u8>>),
 }
 
-/// Decoded blocks, the least recently used of which make room. Blocks of the last run stay, so that a run through more
-/// blocks than there is room for finds some of them again.
+/// A cache of decoded blocks. A new block replaces the least recently used ones, but none that the previous run used: so a
+/// run over more blocks than fit still finds some of them.
 #[derive(Debug)]
 pub(super) struct DecodedBlocks {
     room: usize,
@@ -68,7 +68,7 @@ struct Entry {
     used: u64,
 }
 
-/// The most blocks of which it is remembered that they were read in part.
+/// The largest number of blocks in `seen`; with more, the set begins anew.
 const MOST_SEEN: usize = 1 << 16;
 
 impl DecodedBlocks {

@@ -52,9 +52,9 @@ impl CoefficientFile {
         Ok(block)
     }
 
-    /// The samples of a block in all frames of its window, and the stored bytes read; of frames that need more than the
-    /// coefficients in `wanted` they are arbitrary. Uses what was decoded. Keeps a block of which `is_part` is read, or that
-    /// is read again.
+    /// The samples of a block in all frames of its window, and the stored bytes read. Only the frames for which the
+    /// coefficients in `wanted` suffice are valid. Uses the cache, and adds blocks that are read again. If the caller needs
+    /// only a part of the block (`is_part`), the cache takes it at the first read.
     pub(crate) fn samples(
         &self,
         codec: &WindowCodec,
