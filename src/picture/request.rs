@@ -357,21 +357,21 @@ mod tests {
             "lod": 1, "iso": "0.5,40%:ff0000", "slice": ["z=#3"], "annotate": "box,axes", "shade": true}"#;
         let request = PictureRequest::from_json(json).expect("a request");
         let words = [
-            "--annotate=box,axes",
-            "--depth=16",
-            "--frames=2:9:3",
-            "--iso=0.5,40%:ff0000",
-            "--lod=1",
-            "--range=-1.0,2.5",
-            "--shade",
-            "--size=60x40",
-            "--slice=z=#3",
-            "--view=180,90",
-            "--view=10,-20.5",
+            "annotate=box,axes",
+            "depth=16",
+            "frames=2:9:3",
+            "iso=0.5,40%:ff0000",
+            "lod=1",
+            "range=-1.0,2.5",
+            "shade",
+            "size=60x40",
+            "slice=z=#3",
+            "view=180,90",
+            "view=10,-20.5",
         ];
         let mut all = request.words();
         all.sort();
-        let mut expected = words.map(String::from);
+        let mut expected = words.map(|word| ["--", word].concat());
         expected.sort();
         assert_eq!(all, expected);
         assert_eq!(PictureRequest::from_json("{}").expect("all defaults"), PictureRequest::default());
