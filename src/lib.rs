@@ -144,41 +144,29 @@
 //! - All folders transform through the trait `wavelet::TimeBasis`. Its page says what else a new basis needs. A data
 //!   source of the renderer can be replaced, too: see [`render::Scene`].
 
-pub use base::error::{Error, Result};
-pub use base::grid::{Grid, Region};
-pub use base::sample::SampleType;
+pub use wavesplat_core::base::error::{Error, Result};
+pub use wavesplat_core::base::grid::{Grid, Region};
+pub use wavesplat_core::base::sample::SampleType;
+#[doc(inline)]
+pub use wavesplat_core::{base, bibliography, colour, source, view};
+#[doc(inline)]
+pub use wavesplat_engine::{convert, file, remote, render};
 pub use wavesplat_format as format;
-
-pub mod base;
-pub mod colour;
-pub mod remote;
-pub mod source;
-pub mod formats;
-mod wavelet;
-mod codec;
-pub mod file;
-pub mod view;
-pub mod convert;
-pub mod render;
-pub mod extract;
-pub mod picture;
-#[doc(hidden)]
-#[cfg(feature = "args")]
-pub mod cli;
+#[doc(inline)]
+pub use wavesplat_formats as formats;
+#[doc(inline)]
+pub use wavesplat_jobs::{extract, picture};
 
 /// The parts of `wavelet` and `codec` that tests and benchmarks use. This is no public interface: it may change at any time.
 #[doc(hidden)]
 pub mod internal {
-    pub use crate::codec::WindowCodec;
-    pub use crate::codec::bound::{ErrorBound, difference_up};
-    pub use crate::codec::decode::Block;
-    pub use crate::codec::encode::Encoder;
-    pub use crate::codec::scheme::Scheme;
-    pub use crate::wavelet::{LANES, Lane, TimeBasis, basis, synthesis};
+    pub use wavesplat_core::codec::WindowCodec;
+    pub use wavesplat_core::codec::bound::{ErrorBound, difference_up};
+    pub use wavesplat_core::codec::decode::Block;
+    pub use wavesplat_core::codec::encode::Encoder;
+    pub use wavesplat_core::codec::scheme::Scheme;
+    pub use wavesplat_core::wavelet::{LANES, Lane, TimeBasis, basis, synthesis};
 }
 
 #[doc = include_str!("method.md")]
-#[allow(rustdoc::private_intra_doc_links, reason = "it links to the modules that implement it, public or not")]
 pub mod method {}
-#[doc = include_str!("bibliography.md")]
-pub mod bibliography {}

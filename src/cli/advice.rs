@@ -2,11 +2,11 @@
 
 use super::config::{Config, chosen_command};
 use super::other_program;
-use crate::formats;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::ffi::OsString;
 use std::path::Path;
+use wavesplat_formats as formats;
 
 /// Adds a tip to an error of arguments, or replaces its own by a better one.
 pub(super) fn with_tip(mut error: Error, command: &Command, args: &[OsString], config: &Config) -> Error {

@@ -1,8 +1,8 @@
 //! Options with a few named values.
 
 use super::messages;
-use crate::base::choice::Choice;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use wavesplat_core::base::choice::Choice;
 
 /// Parses the name of a value. Help texts list all names.
 pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {

@@ -3,16 +3,16 @@
 use super::terminal::{ProgressKind, TerminalProgress};
 use super::values::Size;
 use super::{messages, note_text, print};
-use crate::base::error::{Error, Note, Result};
-use crate::base::progress::Progress;
-use crate::base::report::report_text;
-use crate::picture::Reporter;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Arguments;
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::report::report_text;
+use wavesplat_jobs::picture::Reporter;
 
 /// Options that every program and subcommand takes.
 #[derive(Debug, Clone, Args)]

@@ -5,7 +5,6 @@
 //! them.
 
 use super::other_program;
-use crate::base::error::{Error, Result};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use std::env;
@@ -14,6 +13,7 @@ use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
 use toml::de::{DeTable, DeValue};
+use wavesplat_core::base::error::{Error, Result};
 
 /// The id of the option that names a file.
 const CONFIG: &str = "config";

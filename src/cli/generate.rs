@@ -1,8 +1,6 @@
 //! Completions for shells, and man pages.
 
 use super::print;
-use crate::base::error::{Error, Result};
-use crate::base::output::Output;
 use clap::{Command, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -11,6 +9,8 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::Output;
 
 /// What to generate for a program with several commands.
 #[derive(Debug, Clone, Subcommand)]

@@ -1,21 +1,21 @@
 //! Options for reading an archive.
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 use super::{CommonArgs, RemoteArgs, note_text};
 use super::{Dims, FrameRange, RegionSpec, TimesSpec, Triple, times};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::Access;
-use crate::base::sample::SampleType;
-use crate::file::CoefficientFile;
-use crate::file::setting;
-use crate::formats;
-#[cfg(feature = "cli")]
-use crate::picture::is_coefficient_name;
-use crate::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
 use clap::{Args, ValueEnum};
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::Access;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::setting;
+use wavesplat_formats as formats;
+#[cfg(feature = "programs")]
+use wavesplat_jobs::picture::is_coefficient_name;
 
 /// The order of a sample's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -141,7 +141,7 @@ impl InputArgs {
     }
 }
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 impl InputArgs {
     /// Opens an archive, and prints notes on how it is read.
     pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
@@ -257,7 +257,7 @@ impl InputArgs {
 }
 
 /// Fills an option that was not given with the value stored in a file.
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, file: &CoefficientFile, name: &str) -> Result<()> {
     if option.is_none() {
         *option = remembered(file, name)?;

@@ -1,11 +1,11 @@
 //! Words errors and notes of the library as options of the programs.
 
-use crate::base::error::{Error, Note, Remedy};
-use crate::formats::extensions;
-#[cfg(feature = "cli")]
-use crate::picture::is_field;
 use clap::Command;
 use std::borrow::Cow;
+use wavesplat_core::base::error::{Error, Note, Remedy};
+use wavesplat_formats::extensions;
+#[cfg(feature = "programs")]
+use wavesplat_jobs::picture::is_field;
 
 /// The text of an error, with a tip if it has a remedy.
 pub fn error_text(error: &Error, command: &Command) -> String {
@@ -19,7 +19,7 @@ pub fn error_text(error: &Error, command: &Command) -> String {
 }
 
 /// A text about pictures, with options in place of the fields that it has in backquotes.
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 pub(super) fn picture_text(text: &str) -> String {
     worded(text, |quoted| is_field(quoted).then(|| format!("--{}", name(quoted))))
 }

@@ -1,10 +1,10 @@
 //! Options whose value is optional: `--estimate 0.01` means `--estimate=0.01`, but an input may also follow the option.
 
 use super::config::chosen_command;
-use crate::base::error::{Error, Result};
 use clap::Command;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
 
 /// Joins each such option to the number that follows it.
 ///

@@ -4,15 +4,15 @@ use super::advice;
 use super::common::note;
 use super::config::Config;
 use super::{commands, messages, optional, render};
-use crate::base::error::{Error, Result};
-use crate::base::mapped;
-use crate::base::output::abandon;
 use clap::error::ErrorKind;
 use clap::{Command, CommandFactory, Parser};
 use std::env;
 use std::ffi::OsString;
 use std::io::{self, IsTerminal};
 use std::process::{self, ExitCode};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped;
+use wavesplat_core::base::output::abandon;
 
 /// Runs a program: parses its arguments, reports an error once, and turns it into the exit code.
 pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {

@@ -1,15 +1,15 @@
 //! Options for remote files.
 
 use super::Size;
-use crate::base::address::is_address;
-use crate::base::error::Result;
-use crate::base::mapped::Access;
-use crate::file::CoefficientFile;
-use crate::remote::{Cache, RemoteOptions};
 use clap::Args;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use wavesplat_core::base::address::is_address;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::mapped::Access;
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::remote::{Cache, RemoteOptions};
 
 /// Options for files behind https:// and s3://.
 #[derive(Debug, Clone, Args)]

@@ -1,9 +1,9 @@
 //! Progress on standard error: a bar for people, lines for programs, or nothing.
 
 use super::json_progress::JsonProgress;
-use crate::base::progress::Progress;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use wavesplat_core::base::progress::Progress;
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

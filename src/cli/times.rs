@@ -1,18 +1,18 @@
 //! The options of times: those of the user in place of those in the files.
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 use super::remembered;
 use super::{InputArgs, Numbers, Pair};
-use crate::base::error::{Error, Result};
-#[cfg(feature = "cli")]
-use crate::file::{CoefficientFile, setting};
-#[cfg(feature = "cli")]
-use crate::source::{FrameSource, Units, with_times};
-use crate::source::{GivenTimes, RegularTimes};
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use wavesplat_core::base::error::{Error, Result};
+#[cfg(feature = "programs")]
+use wavesplat_core::source::{FrameSource, Units, with_times};
+use wavesplat_core::source::{GivenTimes, RegularTimes};
+#[cfg(feature = "programs")]
+use wavesplat_engine::file::{CoefficientFile, setting};
 
 /// `START,STEP`, or a file with a number for each frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,11 +38,11 @@ pub(super) fn step(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// The setting of times.
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 pub(super) const TIMES: &str = "times";
 
 /// Its value for times from a file, which other frames cannot reuse.
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 const LIST: &str = "list";
 
 impl InputArgs {
@@ -105,7 +105,7 @@ fn time(line: &[u8]) -> std::result::Result<Option<f64>, String> {
     }
 }
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 impl InputArgs {
     /// The value of the setting for the given times.
     pub(super) fn times_setting(&self) -> Option<String> {
@@ -138,7 +138,7 @@ impl InputArgs {
 }
 
 /// The units that a file has.
-#[cfg(feature = "cli")]
+#[cfg(feature = "programs")]
 pub(super) fn units(file: &CoefficientFile) -> Units {
     let text = |name| setting(file.metadata(), name).map(String::from);
     let [samples, times, space, calendar] = Units::SETTINGS.map(text);

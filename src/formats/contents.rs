@@ -1,9 +1,9 @@
 //! The description of extracted samples, for the headers of all formats.
 
 use super::order::{OutputAxis, SampleOrder};
-use crate::base::description::{Attribute, Description, Orientation, Values, coordinates, is_regular};
-use crate::base::grid::Grid;
-use crate::base::sample::SampleType;
+use wavesplat_core::base::description::{Attribute, Description, Orientation, Values, coordinates, is_regular};
+use wavesplat_core::base::grid::Grid;
+use wavesplat_core::base::sample::SampleType;
 
 /// The largest deviation of regular times from equal steps, in steps.
 const REGULAR: f64 = 1e-6;
@@ -155,13 +155,13 @@ impl Contents {
     }
 
     /// The number of samples in one frame.
-    pub(crate) fn voxels(&self) -> u64 {
+    pub fn voxels(&self) -> u64 {
         self.grid.dims.iter().fold(1, |n: u64, dim| n.saturating_mul(*dim as u64))
     }
 }
 
 /// Text fit for one line of a header.
-pub(crate) fn plain(text: &str) -> String {
+pub fn plain(text: &str) -> String {
     text.trim().chars().filter(|c| !c.is_control()).collect()
 }
 

@@ -1,25 +1,25 @@
 //! The encoding of samples in a format.
 
-use crate::base::sample::{SampleType, load, store, swap_endian};
 use std::io::{self, Write};
+use wavesplat_core::base::sample::{SampleType, load, store, swap_endian};
 
 /// Samples converted at a time.
 const RUN: usize = 8 << 10;
 
 /// How samples are converted when they are written.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Encoding {
+pub struct Encoding {
     /// The type before.
-    pub(crate) from: SampleType,
+    pub from: SampleType,
     /// The type in the file; it can represent every value of `from`.
-    pub(crate) to: SampleType,
+    pub to: SampleType,
     /// Whether the file is big-endian.
     pub(crate) big_endian: bool,
 }
 
 impl Encoding {
     /// Writes little-endian samples in the file's encoding.
-    pub(crate) fn write(&self, samples: &[u8], out: &mut dyn Write) -> io::Result<()> {
+    pub fn write(&self, samples: &[u8], out: &mut dyn Write) -> io::Result<()> {
         if self.from == self.to && !self.big_endian {
             return out.write_all(samples);
         }

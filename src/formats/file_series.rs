@@ -1,12 +1,12 @@
 //! ParaView's `.vti.series` and the like: a list of files and their times, in JSON.
 
 use super::format::{Format, Reader};
-use crate::base::error::{Error, Result};
-use crate::source::Parsed;
-use crate::source::series::FrameFiles;
 use serde::Deserialize;
 use std::fs;
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::series::FrameFiles;
 
 pub(crate) static FORMAT: Format = Format::new("list of files", &["series"], Reader::List(read));
 
@@ -39,10 +39,10 @@ fn parse(bytes: &[u8], folder: &Path) -> Parsed<FrameFiles> {
 
 #[cfg(test)]
 mod tests {
-    use crate::base::sample::SampleType;
-    use crate::formats::open;
-    use crate::formats::testing::{Folder, check_inputs, payload, refused};
-    use crate::source::OpenOptions;
+    use crate::open;
+    use crate::testing::{Folder, check_inputs, payload, refused};
+    use wavesplat_core::base::sample::SampleType;
+    use wavesplat_core::source::OpenOptions;
 
     fn frames(folder: &Folder) -> Vec<String> {
         let text = "# vtk DataFile Version 3.0\n\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS 7 5 3\nPOINT_DATA 105\nSCALARS J char\n";

@@ -2,11 +2,11 @@
 
 use super::arrays::ArrayArchive;
 use super::writer::Writer;
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::source::file_header::FileHeader;
-use crate::source::series::FrameFiles;
-use crate::source::{Extent, OpenOptions, VariableInfo};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::source::file_header::FileHeader;
+use wavesplat_core::source::series::FrameFiles;
+use wavesplat_core::source::{Extent, OpenOptions, VariableInfo};
 
 /// A format of files.
 pub(crate) struct Format {

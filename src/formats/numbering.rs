@@ -1,8 +1,8 @@
 //! Finds missing frames by the numbers in file names.
 
-use crate::base::error::{Error, Note, Remedy, Result};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 
 const MAX_DIGITS: usize = 18; // longer numbers are left alone
 const MARK: char = '\0'; // in no path

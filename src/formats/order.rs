@@ -1,6 +1,6 @@
 //! The order of extracted samples: any order of the axes, each axis of voxels in either direction.
 
-use crate::base::description::{AxisRole, Description};
+use wavesplat_core::base::description::{AxisRole, Description};
 
 /// An axis of the extracted array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl OutputAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::description::{ArrayAxis, Dimension};
+    use wavesplat_core::base::description::{ArrayAxis, Dimension};
 
     #[test]
     fn absent_axes_are_the_slowest() {

@@ -2,13 +2,13 @@
 
 use super::format::{Choices, Format, Reader};
 use super::writer::Writer;
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::source::OpenOptions;
-use crate::source::file_header::{FileHeader, check_size};
-use crate::source::layout::Shape;
-use crate::source::parts::{DataLocation, Part, Stored};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::source::OpenOptions;
+use wavesplat_core::source::file_header::{FileHeader, check_size};
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
 
 pub(crate) static FORMAT: Format = Format {
     writers: &[Writer { has_halves: true, ..Writer::PLAIN }],
@@ -71,8 +71,8 @@ fn remedy(len: u64, shape: &Shape, options: &OpenOptions) -> Remedy {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::sample::SampleType;
-    use crate::formats::testing::{DIMS, Folder, check_inputs, payload, refused};
+    use crate::testing::{DIMS, Folder, check_inputs, payload, refused};
+    use wavesplat_core::base::sample::SampleType;
 
     fn options(frames: Option<usize>, sample: SampleType) -> OpenOptions {
         let dims = DIMS.into_iter().chain(frames).collect();

@@ -1,13 +1,13 @@
 //! Helpers for the tests of the formats: files, and checks of opening them.
 
-pub(crate) use crate::source::testing::{DIMS, check_source, check_window, message, payload, value};
+pub(crate) use wavesplat_core::source::testing::{DIMS, check_source, check_window, message, payload, value};
 
-use super::open::open;
-use crate::base::mapped::Access;
-use crate::base::sample::SampleType;
-use crate::source::OpenOptions;
+use crate::open::open;
 use std::fs;
 use std::path::PathBuf;
+use wavesplat_core::base::mapped::Access;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::OpenOptions;
 
 /// A folder that vanishes with the test.
 pub(crate) struct Folder(tempfile::TempDir);

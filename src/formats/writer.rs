@@ -4,21 +4,22 @@ use super::FORMATS;
 use super::contents::Contents;
 use super::encoding::Encoding;
 use super::order::SampleOrder;
-use crate::base::error::Result;
-use crate::base::sample::SampleType;
 use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::sample::SampleType;
 
 /// A way to write samples.
-pub(crate) struct Writer {
+pub struct Writer {
     /// Its name, which is also its file extension.
     pub(crate) name: &'static str,
     /// Its place among the names in messages.
     pub(crate) place: usize,
     /// The format's name in notes; `None` if it stores everything.
-    pub(crate) label: Option<&'static str>,
-    pub(crate) files: OutputFiles,
+    pub label: Option<&'static str>,
+    /// The files of one extraction.
+    pub files: OutputFiles,
     pub(crate) axes: Axes,
     /// Whether samples may be floats of 16 bits.
     pub(crate) has_halves: bool,
@@ -29,32 +30,42 @@ pub(crate) struct Writer {
     /// Whether it can store positions of voxels that are not at regular steps.
     pub(crate) has_coordinates: bool,
     /// Whether the whole file is in gzip.
-    pub(crate) gzip: bool,
+    pub gzip: bool,
     /// Writes the header before the samples of a file.
-    pub(crate) before: fn(&Contents, Samples, &mut dyn Write) -> io::Result<()>,
+    pub before: fn(&Contents, Samples, &mut dyn Write) -> io::Result<()>,
     /// The bytes after the samples.
-    pub(crate) after: fn(&Contents, Samples) -> Vec<u8>,
+    pub after: fn(&Contents, Samples) -> Vec<u8>,
 }
 
 /// The samples of a file.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Samples {
+pub struct Samples {
     /// Their type in the file.
-    pub(crate) ty: SampleType,
+    pub ty: SampleType,
     /// The first of their frames, counted from the first extracted one.
-    pub(crate) frame: usize,
+    pub frame: usize,
 }
 
 /// The files of one extraction.
-pub(crate) enum OutputFiles {
+pub enum OutputFiles {
     /// One for all frames.
     One,
     /// One for each frame.
     EachFrame,
     /// One for each frame in a folder, with this extension, and a list of them.
-    List { extension: &'static str, write: WriteList },
+    List {
+        /// Of the list.
+        extension: &'static str,
+        /// Writes it.
+        write: WriteList,
+    },
     /// One for all frames, with this extension, and a header beside it.
-    WithHeader { extension: &'static str, write: WriteHeader },
+    WithHeader {
+        /// Of the samples.
+        extension: &'static str,
+        /// Writes the header.
+        write: WriteHeader,
+    },
     /// A folder.
     Folder(CreateFolder),
 }
@@ -69,7 +80,7 @@ pub(crate) type WriteHeader = fn(&Contents, SampleType, &str, &mut dyn Write) ->
 pub(crate) type CreateFolder = fn(&Path, &Contents, Encoding, bool) -> Result<Box<dyn SampleSink>>;
 
 /// Takes samples in their order.
-pub(crate) trait SampleSink: fmt::Debug {
+pub trait SampleSink: fmt::Debug {
     /// Writes the next samples, given little-endian.
     fn write(&mut self, samples: &[u8]) -> Result<()>;
 
@@ -144,12 +155,13 @@ impl SampleFormat {
         known.or_else(|| Self::named("raw").filter(|_| has("bin")))
     }
 
-    pub(crate) fn writer(self) -> &'static Writer {
+    /// How it is written.
+    pub fn writer(self) -> &'static Writer {
         self.0
     }
 
     /// How the samples are written in this format.
-    pub(crate) fn encoding(self, contents: &Contents) -> Encoding {
+    pub fn encoding(self, contents: &Contents) -> Encoding {
         let from = contents.sample;
         let to = if from == SampleType::F16 && !self.0.has_halves { SampleType::F32 } else { from };
         Encoding { from, to, big_endian: (self.0.is_big_endian)(contents) }

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::sample::SampleType;
-use wavesplat::cli::InputArgs;
-use wavesplat::cli::error_text;
+use wavesplat_cli::InputArgs;
+use wavesplat_cli::error_text;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
 use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
@@ -346,14 +346,14 @@ fn demo(args: &Demo) -> Result<()> {
     let all = demo::Demo::new(args.output.clone());
     let table = demo::run(&all, &mut |step| say(&format!("{step} ...")))?;
     let figure = all.figure();
-    wavesplat::cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
+    wavesplat_cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
 }
 
 fn gallery(args: &GalleryArgs) -> Result<()> {
     let GalleryArgs { archives, output, input } = args;
     let all = Gallery { archives: archives.clone(), input: input.clone(), folder: output.clone(), side: gallery::SIDE };
     all.draw(&mut |step| say(&format!("{step} ...")))?;
-    wavesplat::cli::print(&format!("{}\n", all.sheet().display()))
+    wavesplat_cli::print(&format!("{}\n", all.sheet().display()))
 }
 
 fn synth(args: &SynthArgs) -> Result<()> {
@@ -369,7 +369,7 @@ fn this_program() -> Result<PathBuf> {
 
 fn bench_size(args: &SizeArgs) -> Result<()> {
     let (results, tables) = size::run(&args.config()?, &mut say)?;
-    wavesplat::cli::print(&tables)?;
+    wavesplat_cli::print(&tables)?;
     let wrong = size::complaints(&results);
     if wrong.is_empty() {
         return Ok(());
@@ -382,7 +382,7 @@ fn bench_layers(args: &LayersArgs) -> Result<()> {
     let (inputs, tolerances, output) = (inputs.clone(), tolerances.clone(), output.clone());
     let config = layers::Config { inputs, tolerances, output, program: this_program()?, date: date.clone() };
     let (results, table) = layers::run(&config, &mut say)?;
-    wavesplat::cli::print(&table)?;
+    wavesplat_cli::print(&table)?;
     let wrong = layers::complaints(&results);
     if wrong.is_empty() {
         return Ok(());
@@ -396,7 +396,7 @@ fn bench_speed(args: &SpeedArgs) -> Result<()> {
         Some(folder) => speed::against::run(&config, folder, &mut say)?,
         None => speed::run(&config, &mut say)?.1,
     };
-    wavesplat::cli::print(&tables)
+    wavesplat_cli::print(&tables)
 }
 
 fn bench(args: &BenchArgs) -> Result<()> {
@@ -408,7 +408,7 @@ fn bench(args: &BenchArgs) -> Result<()> {
     if !wrong.is_empty() {
         return Err(Error::BoundMissed { path: args.output.clone(), what: wrong.join("\n") });
     }
-    wavesplat::cli::print(&format!("{}\n", args.output.join("results.md").display()))
+    wavesplat_cli::print(&format!("{}\n", args.output.join("results.md").display()))
 }
 
 fn report(error: &Error) -> ExitCode {
@@ -430,7 +430,7 @@ fn main() -> ExitCode {
             None => bench(&args),
         },
         Command::BenchStep { name, task } => {
-            bench::run_step(&name, &task).and_then(|answer| wavesplat::cli::print(&answer))
+            bench::run_step(&name, &task).and_then(|answer| wavesplat_cli::print(&answer))
         }
     };
     result.map_or_else(|e| report(&e), |()| ExitCode::SUCCESS)

@@ -1,8 +1,8 @@
 //! `wavesplat`: converts archives to coefficient files, and inspects, checks and extracts them.
 
 use std::process::ExitCode;
-use wavesplat::cli::{self, commands};
+use wavesplat_cli::commands::Cli;
 
 fn main() -> ExitCode {
-    cli::main(commands::Cli::run)
+    wavesplat_cli::main(Cli::run)
 }

@@ -1,18 +1,18 @@
 //! `wavesplat append`
 
 use super::convert::report;
-use crate::base::address::refuse_output;
-use crate::base::error::{Error, Result};
-use crate::base::output::{STANDARD, part_of};
-use crate::cli::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
-use crate::convert::{ConvertConfig, append};
-use crate::file::CoefficientFile;
-use crate::file::merge::Shards;
-use crate::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
-use crate::file::shard::frames_of_shard;
-use crate::source::FrameSource;
+use crate::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::address::refuse_output;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::{STANDARD, part_of};
+use wavesplat_core::source::FrameSource;
+use wavesplat_engine::convert::{ConvertConfig, append};
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::merge::Shards;
+use wavesplat_engine::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
+use wavesplat_engine::file::shard::frames_of_shard;
 
 /// Add later frames to a coefficient file
 #[derive(Debug, Args)]

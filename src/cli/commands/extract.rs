@@ -1,18 +1,18 @@
 //! `wavesplat extract`
 
-use crate::base::error::{Error, Result};
-use crate::base::grid::Region;
-use crate::base::mapped::Access;
-use crate::base::output::STANDARD;
-use crate::cli::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
-use crate::extract::{
-    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to,
-};
-use crate::file::CoefficientFile;
-use crate::source::CHANNELS;
+use crate::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::mapped::Access;
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::source::CHANNELS;
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_jobs::extract::{
+    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to,
+};
 
 /// Decode a coefficient file back to samples
 #[derive(Debug, Args)]

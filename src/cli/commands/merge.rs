@@ -1,12 +1,12 @@
 //! `wavesplat merge`
 
-use crate::base::error::{Error, Result};
-use crate::base::output::STANDARD;
-use crate::cli::{CommonArgs, spare_inputs};
-use crate::file::merge::{MergeReport, Shards};
-use crate::file::resume::{self, IfUnfinished};
+use crate::{CommonArgs, spare_inputs};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_engine::file::merge::{MergeReport, Shards};
+use wavesplat_engine::file::resume::{self, IfUnfinished};
 
 /// Join shards into one coefficient file
 #[derive(Debug, Args)]

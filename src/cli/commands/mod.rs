@@ -11,11 +11,11 @@ mod scan;
 mod several;
 mod verify;
 
-use crate::base::error::Result;
+use crate::GenerateArgs;
 #[cfg(feature = "view")]
-use crate::cli::view;
-use crate::cli::{self, GenerateArgs};
+use crate::view;
 use clap::{Parser, Subcommand};
+use wavesplat_core::base::error::Result;
 
 /// Compresses time-varying volumes along time under a guaranteed error bound.
 #[derive(Debug, Parser)]
@@ -82,7 +82,7 @@ impl Cli {
             Command::Merge(args) => merge::run(&args),
             #[cfg(feature = "view")]
             Command::View(args) => view::run(&args),
-            Command::Generate(args) => args.run(cli::command::<Self>()),
+            Command::Generate(args) => args.run(crate::command::<Self>()),
         }
     }
 }

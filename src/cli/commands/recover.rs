@@ -1,13 +1,13 @@
 //! `wavesplat recover`
 
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::output::{Output, STANDARD};
-use crate::cli::{CommonArgs, print, spare_inputs};
-use crate::file::recover::{RecoverReport, recover};
-use crate::file::resume;
+use crate::{CommonArgs, print, spare_inputs};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::output::{Output, STANDARD};
+use wavesplat_engine::file::recover::{RecoverReport, recover};
+use wavesplat_engine::file::resume;
 
 /// Save the undamaged blocks of a damaged coefficient file
 #[derive(Debug, Args)]

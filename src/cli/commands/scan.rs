@@ -1,12 +1,12 @@
 //! `wavesplat scan`
 
-use crate::base::error::{Error, Result};
-use crate::base::output::Output;
-use crate::cli::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
-use crate::convert::shard::{ArchiveScan, Shard};
+use crate::{CommonArgs, InputArgs, SelectArgs, spare_inputs};
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::Output;
+use wavesplat_engine::convert::shard::{ArchiveScan, Shard};
 
 /// Find the value range of all frames, which conversions of shards need
 #[derive(Debug, Args)]

@@ -1,10 +1,10 @@
 //! Several variables of an archive, each converted to a file of its own.
 
 use super::convert::ConvertArgs;
-use crate::base::error::{Error, Result};
-use crate::cli::InputArgs;
+use crate::InputArgs;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use wavesplat_core::base::error::{Error, Result};
 
 /// The placeholder for a variable's name in the name of the output.
 const NAME: &str = "%n";
@@ -49,7 +49,7 @@ fn names(args: &ConvertArgs) -> Result<Option<Vec<Chosen>>> {
             let mut input = args.input.clone();
             input.variable = None;
             let all = input.undecided(&args.inputs, args.common.stream_memory())?;
-            let components = |variable: &crate::source::VariableInfo| match variable.components {
+            let components = |variable: &wavesplat_core::source::VariableInfo| match variable.components {
                 1 => vec![variable.name.clone()],
                 n => (0..n).map(|component| format!("{}[{component}]", variable.name)).collect(),
             };

@@ -1,15 +1,15 @@
 //! `wavesplat verify`
 
-use crate::base::error::{Error, Result};
-use crate::cli::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
-use crate::file::CoefficientFile;
-use crate::file::report::{BoundReport, largest_bound};
-use crate::file::shard::frames_of_shard;
-use crate::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
-use crate::source::FrameSource;
+use crate::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::source::FrameSource;
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::report::{BoundReport, largest_bound};
+use wavesplat_engine::file::shard::frames_of_shard;
+use wavesplat_engine::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 
 /// Check a coefficient file for damage, and its error bound against the source
 #[derive(Debug, Args)]

@@ -1,18 +1,18 @@
 //! The arguments of `wavesplat-render`.
 
 use super::groups::{AnnotationArgs, ColourArgs, MotionArgs, PartialArgs, SampleArgs, SeriesArgs, SliceArgs};
-use crate::base::address::is_address;
-use crate::base::choice::Choice;
-use crate::base::error::Result;
-use crate::base::values::{FrameList, RegionSpec, Triple, Whole};
-use crate::cli::choice::choice;
-use crate::cli::{CommonArgs, InputArgs, RemoteArgs, share};
-use crate::picture::values::{Detail, Exaggeration, ViewAngles};
-use crate::picture::{Inputs, MOST_VIEWS, PictureRequest, Session};
-use crate::render::sink::{Depth, PictureFormat};
-use crate::render::{Limit, Quantity, SplatSource};
+use crate::choice::choice;
+use crate::{CommonArgs, InputArgs, RemoteArgs, share};
 use clap::Parser;
 use std::path::PathBuf;
+use wavesplat_core::base::address::is_address;
+use wavesplat_core::base::choice::Choice;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::values::{FrameList, RegionSpec, Triple, Whole};
+use wavesplat_engine::render::sink::{Depth, PictureFormat};
+use wavesplat_engine::render::{Limit, Quantity, SplatSource};
+use wavesplat_jobs::picture::values::{Detail, Exaggeration, ViewAngles};
+use wavesplat_jobs::picture::{Inputs, MOST_VIEWS, PictureRequest, Session};
 
 /// Render pictures of time-varying volumes.
 #[derive(Debug, Parser)]

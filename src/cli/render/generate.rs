@@ -1,10 +1,10 @@
 //! `--generate`: prints completions or the man page.
 
 use super::args::Cli;
-use crate::base::error::Result;
-use crate::cli::{self, Generated};
-use crate::picture::exclude;
+use crate::Generated;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Id, Parser};
+use wavesplat_core::base::error::Result;
+use wavesplat_jobs::picture::exclude;
 
 /// The two things that the program can do.
 pub enum Program {
@@ -17,7 +17,7 @@ impl Program {
     pub fn run(self) -> Result<()> {
         match self {
             Self::Render(cli) => cli.run(),
-            Self::Generate(what) => what.run(cli::command::<Self>()),
+            Self::Generate(what) => what.run(crate::command::<Self>()),
         }
     }
 }

@@ -1,14 +1,14 @@
 //! Groups of options: the camera over time, colours, what is drawn around, samples along a ray, slices, time series and
 //! partial sums. Each fills its fields of a request.
 
-use crate::base::values::{Pair, RegionSpec};
-use crate::cli::choice::choice;
-use crate::colour::{Norm, Opacities};
-use crate::picture::values::{ClearSpec, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme};
-use crate::picture::{PictureRequest, check_fps, check_speed};
-use crate::render::annotate::Parts;
+use crate::choice::choice;
 use clap::Args;
 use std::path::PathBuf;
+use wavesplat_core::base::values::{Pair, RegionSpec};
+use wavesplat_core::colour::{Norm, Opacities};
+use wavesplat_engine::render::annotate::Parts;
+use wavesplat_jobs::picture::values::{ClearSpec, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme};
+use wavesplat_jobs::picture::{PictureRequest, check_fps, check_speed};
 
 /// Options for the camera over time, and for the speed of movies.
 #[derive(Debug, Args)]

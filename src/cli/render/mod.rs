@@ -5,13 +5,13 @@ mod args;
 mod generate;
 mod groups;
 
-use crate::base::error::{Error, Result};
-use crate::cli::CommonArgs;
-use crate::picture::{self, PictureRequest, Session};
+use crate::CommonArgs;
 use args::Cli;
 use clap::Parser;
 pub use generate::Program;
 use std::ffi::OsString;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_jobs::picture::{self, PictureRequest, Session};
 
 /// The meaning of the words after `wavesplat-render`.
 pub struct Parsed {

@@ -1,8 +1,8 @@
 //! Admits requests only from pages of this server, which know its token.
 
-use crate::base::error::{Error, Result};
 use axum::http::{HeaderMap, HeaderValue, header};
 use std::net::SocketAddr;
+use wavesplat_core::base::error::{Error, Result};
 
 /// A random word of 128 bits.
 pub(super) fn token() -> Result<String> {

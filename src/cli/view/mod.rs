@@ -4,15 +4,15 @@ mod browser;
 mod guard;
 mod server;
 
-use crate::base::error::{Error, Result};
-use crate::cli::{self, CommonArgs, RemoteArgs, render};
-use crate::picture::{ViewerSession, is_coefficient_name};
+use crate::{CommonArgs, RemoteArgs, render};
 use clap::Args;
 use server::{Server, Stop};
 use std::ffi::OsString;
 use std::net::{IpAddr, Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::{io, thread};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_jobs::picture::{ViewerSession, is_coefficient_name};
 
 /// Look around in a browser: turn, zoom, play, choose colours
 ///
@@ -55,7 +55,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
     if !args.listen.is_loopback() {
         args.common.note("other machines that know this address can look at these data:");
     }
-    cli::print(&format!("{}\n", viewer.address))?;
+    crate::print(&format!("{}\n", viewer.address))?;
     if !args.no_open {
         browser::open(&viewer.address);
     }

@@ -1,9 +1,6 @@
 //! The server of the page: it renders what the page asks for, one request after another, as long as the page waits.
 
 use super::guard;
-use crate::base::cancel::CancelToken;
-use crate::base::error::Result;
-use crate::picture::{Saved, ViewRequest, ViewerSession};
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Query, Request, State};
@@ -21,6 +18,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::{Notify, Semaphore};
 use tower_service::Service;
+use wavesplat_core::base::cancel::CancelToken;
+use wavesplat_core::base::error::Result;
+use wavesplat_jobs::picture::{Saved, ViewRequest, ViewerSession};
 
 /// Most bytes of a request.
 const MOST_BYTES: usize = 64 << 10;
@@ -175,7 +175,7 @@ async fn whole(request: Request) -> Option<Request> {
 }
 
 async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed> {
-    let failed = |e: crate::base::error::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
+    let failed = |e: wavesplat_core::base::error::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
     let nonce = guard::token().map_err(failed)?;
     ViewerSession::page(&server.facts, &nonce).map(Html).map_err(failed)
 }

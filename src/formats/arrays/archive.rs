@@ -7,13 +7,13 @@ use super::places::Places;
 use super::resolve::{Context, ResolvedArray};
 use super::sibling_times::StepArrays;
 use super::{ArrayFile, FileArrays, Variable, openpmd, vtkhdf};
-use crate::base::error::{Error, Note, Result};
-use crate::base::mapped::{Access, FileBytes, State};
-use crate::formats::numbering;
-use crate::source::file_header::FileHeader;
-use crate::source::parts::Part;
-use crate::source::{Advised, Extent, OpenOptions, Parsed};
+use crate::numbering;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes, State};
+use wavesplat_core::source::file_header::FileHeader;
+use wavesplat_core::source::parts::Part;
+use wavesplat_core::source::{Advised, Extent, OpenOptions, Parsed};
 
 /// An open file of arrays.
 pub(crate) struct ArrayArchive {
@@ -56,7 +56,7 @@ impl ArrayArchive {
     }
 
     /// The variables among which the user must choose; none if it is clear which one is meant.
-    pub(crate) fn undecided(&self) -> Result<Vec<crate::source::VariableInfo>> {
+    pub(crate) fn undecided(&self) -> Result<Vec<wavesplat_core::source::VariableInfo>> {
         let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
         Ok(choose::undecided(&all, active(image.as_ref())))
     }

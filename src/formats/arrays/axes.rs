@@ -2,10 +2,10 @@
 //! order.
 
 use super::Variable;
-use crate::base::description::AxisRole;
-use crate::base::error::{Note, Remedy};
-use crate::source::Advised;
-use crate::source::layout::Axis;
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::error::{Note, Remedy};
+use wavesplat_core::source::Advised;
+use wavesplat_core::source::layout::Axis;
 
 const ORDER: [AxisRole; 4] = [AxisRole::Frames, AxisRole::Z, AxisRole::Y, AxisRole::X];
 const LETTERS: [char; 4] = ['t', 'z', 'y', 'x'];

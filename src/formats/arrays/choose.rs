@@ -1,11 +1,11 @@
 //! Which variable of a file is meant.
 
 use super::Variable;
-use crate::base::error::{Note, Remedy};
-use crate::formats::shared::component;
-use crate::source::variables::{self, VariableAxis};
-use crate::source::{self, Advised, Parsed};
+use crate::shared::component;
 use std::collections::{BTreeMap, HashSet};
+use wavesplat_core::base::error::{Note, Remedy};
+use wavesplat_core::source::variables::{self, VariableAxis};
+use wavesplat_core::source::{self, Advised, Parsed};
 
 /// The placeholder for the step number in the path of a variable that has one array per step.
 pub(crate) const STEP: &str = "%T";

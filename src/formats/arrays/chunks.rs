@@ -2,16 +2,16 @@
 
 use super::opener::Opener;
 use super::{ArrayFile, Variable};
-use crate::base::description::AxisRole;
-use crate::base::error::{Error, Result};
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
-use crate::source::layout::{Axis, Layout};
-use crate::source::parts::{Decode, Stored};
-use crate::source::spill_buffer::SpillBuffer;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::parts::{Decode, Stored};
+use wavesplat_core::source::spill_buffer::SpillBuffer;
 
 /// Frames of a variable that is not in chunks and has time as a faster axis than others: to be read together.
 const MANY: usize = 32;
@@ -169,9 +169,9 @@ mod tests {
     use super::super::Attributes;
     use super::super::opener::ReadConfig;
     use super::*;
-    use crate::base::description::{Attribute, NumberType, Values};
-    use crate::base::mapped::Access;
     use std::sync::{Arc, Mutex};
+    use wavesplat_core::base::description::{Attribute, NumberType, Values};
+    use wavesplat_core::base::mapped::Access;
 
     const LENGTHS: [usize; 5] = [7, 2, 5, 4, 6]; // t, one of two, z, y, x
     const CHUNK: [usize; 5] = [3, 1, 2, 4, 5];

@@ -1,11 +1,11 @@
 //! The description in a file of arrays: dimensions, attributes, coordinates and other small arrays.
 
 use super::{ArrayFile, Variable};
-use crate::base::description::{
+use wavesplat_core::base::description::{
     ArrayAxis, Attribute, AxisRole, Description, Dimension, Values, Variable as Described, frames_of, select,
 };
-use crate::source::layout::Axis;
-use crate::source::{Extent, Parsed};
+use wavesplat_core::source::layout::Axis;
+use wavesplat_core::source::{Extent, Parsed};
 
 /// Bytes of an array that is kept whole.
 const MOST_BYTES: usize = 8 << 20;
@@ -198,6 +198,6 @@ fn is_users(attribute: &Attribute) -> bool {
 
 /// Numbers as values.
 #[cfg(any(feature = "hdf5", feature = "netcdf", feature = "zarr"))]
-pub(crate) fn numbers(ty: crate::base::description::NumberType, bytes: &[u8]) -> Values {
-    Values::Numbers(crate::base::description::Numbers::new(ty, bytes))
+pub(crate) fn numbers(ty: wavesplat_core::base::description::NumberType, bytes: &[u8]) -> Values {
+    Values::Numbers(wavesplat_core::base::description::Numbers::new(ty, bytes))
 }

@@ -1,9 +1,9 @@
 //! The bytes of a file for the crates that read HDF5, and messages about files that they cannot read.
 
-use crate::base::mapped::FileBytes;
 use hdf5_reader::error::Error as Hdf5Error;
 use hdf5_reader::storage::{DynStorage, Storage, StorageBuffer};
 use std::sync::Arc;
+use wavesplat_core::base::mapped::FileBytes;
 
 /// The bytes of a file for the reader.
 pub(crate) fn storage(file: FileBytes) -> DynStorage {

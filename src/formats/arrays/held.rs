@@ -1,14 +1,14 @@
 //! Named arrays that the caller holds or computes, such as a dataset of another program, as [`super::ArrayFile`].
 
 use super::{ArrayArchive, ArrayFile, Variable, attributes};
-use crate::base::description::{self, NumberType, Numbers, Values};
-use crate::base::error::Result;
-use crate::base::stored::StoredType;
-use crate::source::file_header::FileHeader;
-use crate::source::{Extent, OpenOptions, Parsed};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use wavesplat_core::base::description::{self, NumberType, Numbers, Values};
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::file_header::FileHeader;
+use wavesplat_core::source::{Extent, OpenOptions, Parsed};
 
 /// Named arrays that the caller holds or computes: samples, their coordinates and other arrays, as a NetCDF file has them.
 ///
@@ -164,11 +164,11 @@ fn stored_type(array: &NamedArray) -> Parsed<StoredType> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::description::Dimension;
-    use crate::base::grid::Region;
-    use crate::base::sample::SampleType;
-    use crate::formats::open_arrays;
-    use crate::source::read_frames;
+    use crate::open_arrays;
+    use wavesplat_core::base::description::Dimension;
+    use wavesplat_core::base::grid::Region;
+    use wavesplat_core::base::sample::SampleType;
+    use wavesplat_core::source::read_frames;
 
     /// Samples (time, lev, lat, lon) with descending lat; the sample at i is i.
     struct Ocean;

@@ -1,10 +1,10 @@
 //! Arrays stored uncompressed: they are read in place, without decoding.
 
-use crate::base::description::AxisRole;
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
-use crate::source::layout::{Axis, Layout};
-use crate::source::parts::Stored;
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::parts::Stored;
 
 /// Where the numbers of an array are. The last axis is the fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +51,7 @@ impl InPlace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::sample::SampleType;
+    use wavesplat_core::base::sample::SampleType;
 
     fn place(record: Option<u64>) -> InPlace {
         InPlace { start: 100, record, big_endian: true }

@@ -27,11 +27,11 @@ pub(crate) mod held;
 pub(crate) use archive::ArrayArchive;
 pub(crate) use variable::{Attribute, Attributes, Variable, attributes};
 
-use crate::base::description;
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
 use in_place::InPlace;
 use std::ops::Range;
+use wavesplat_core::base::description;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
 
 /// An open file, and all arrays that are meant in it.
 #[derive(Clone, Copy)]

@@ -1,11 +1,11 @@
 //! Opens a file of arrays, any number of times.
 
 use super::ArrayFile;
-use crate::base::error::Result;
-use crate::base::mapped::Access;
-use crate::source::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::mapped::Access;
+use wavesplat_core::source::OpenOptions;
 
 /// Decoded chunks get one part in so many of the memory for a window.
 const SHARE: usize = 4;

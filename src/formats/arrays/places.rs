@@ -2,9 +2,9 @@
 
 use super::sibling_times::StepArrays;
 use super::{ArrayFile, FileArrays, Variable, axes, coordinates};
-use crate::base::description::AxisRole;
-use crate::base::error::{Note, Remedy};
-use crate::source::layout::Axis;
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::error::{Note, Remedy};
+use wavesplat_core::source::layout::Axis;
 
 /// Steps along an axis may differ by so much of one: coordinates are often rounded to single precision.
 const REGULAR: f64 = 1e-2;

@@ -6,13 +6,13 @@ use super::in_place::InPlace;
 use super::places::Places;
 use super::values::Values;
 use super::{FileArrays, Variable, describe, openpmd, vtkhdf};
-use crate::base::description::{AxisRole, Description};
-use crate::base::mapped::State;
-use crate::source::file_header::{FileHeader, Units};
-use crate::source::layout::{Axis, Layout, Shape};
-use crate::source::parts::{DataLocation, Part, Stored};
-use crate::source::{Advised, Extent, Parsed};
 use std::path::Path;
+use wavesplat_core::base::description::{AxisRole, Description};
+use wavesplat_core::base::mapped::State;
+use wavesplat_core::source::file_header::{FileHeader, Units};
+use wavesplat_core::source::layout::{Axis, Layout, Shape};
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
+use wavesplat_core::source::{Advised, Extent, Parsed};
 
 /// What variables are found in.
 pub(crate) struct Context<'a> {

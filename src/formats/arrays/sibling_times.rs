@@ -1,7 +1,7 @@
 //! Times that are stored beside frames: arrays that no convention ties to an axis, by the names that programs give them.
 
 use super::{FileArrays, Variable, coordinates};
-use crate::base::error::Note;
+use wavesplat_core::base::error::Note;
 
 /// Names of arrays of times, in lower case.
 const NAMES: [&str; 4] = ["time", "times", "t", "timesteps"];

@@ -1,10 +1,10 @@
 //! What the numbers of a variable mean, by the attributes of the NetCDF conventions.
 
 use super::Variable;
-use crate::base::sample::{self, SampleType};
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
-use crate::source::packing::Packing;
+use wavesplat_core::base::sample::{self, SampleType};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::packing::Packing;
 
 /// The samples that numbers stand for.
 #[derive(Debug)]

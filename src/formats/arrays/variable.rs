@@ -1,9 +1,9 @@
 //! An array of a file, and its attributes.
 
-use crate::base::description::{self, Values};
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
 use std::collections::BTreeMap;
+use wavesplat_core::base::description::{self, Values};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
 
 /// An array and its attributes.
 #[derive(Debug, Clone)]

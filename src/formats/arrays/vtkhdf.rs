@@ -1,8 +1,8 @@
 //! Images in VTKHDF: arrays of an HDF5 file with axes, lattice and steps by VTK's conventions.
 
 use super::{ArrayFile, Attribute, Variable};
-use crate::formats::shared::association::Association;
-use crate::source::Parsed;
+use crate::shared::association::Association;
+use wavesplat_core::source::Parsed;
 
 /// The arrays of such a file, and their lattice.
 pub(crate) struct Image {

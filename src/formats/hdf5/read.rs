@@ -1,15 +1,10 @@
 //! HDF5 files as [`ArrayFile`].
 
 use super::scales::Scales;
-use crate::base::description::{self, NumberType};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::FileBytes;
-use crate::base::stored::StoredType;
-use crate::formats::arrays::describe::numbers;
-use crate::formats::arrays::hdf5_storage::{reason, storage};
-use crate::formats::arrays::opener::ReadConfig;
-use crate::formats::arrays::{ArrayArchive, ArrayFile, Attributes, Variable, attributes};
-use crate::source::{OpenOptions, Parsed};
+use crate::arrays::describe::numbers;
+use crate::arrays::hdf5_storage::{reason, storage};
+use crate::arrays::opener::ReadConfig;
+use crate::arrays::{ArrayArchive, ArrayFile, Attributes, Variable, attributes};
 use hdf5_reader::error::Error as Hdf5Error;
 use hdf5_reader::group::Group;
 use hdf5_reader::{ByteOrder, Dataset, Datatype, H5Type, Hdf5File, SliceInfo, SliceInfoElem};
@@ -17,6 +12,11 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use wavesplat_core::base::description::{self, NumberType};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::FileBytes;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::{OpenOptions, Parsed};
 
 /// Groups within groups that are looked at, and all objects.
 const MOST_DEPTH: usize = 16;
@@ -27,9 +27,9 @@ pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let archive = ArrayArchive::open("HDF5", path, Some(path), Arc::new(open_file), options)?;
     match archive.is_of_netcdf() {
         #[cfg(feature = "netcdf")]
-        true => crate::formats::netcdf::open(path, options),
+        true => crate::netcdf::open(path, options),
         #[cfg(not(feature = "netcdf"))]
-        true => Err(crate::formats::netcdf::FORMAT.not_built_in(path, "netcdf")),
+        true => Err(crate::netcdf::FORMAT.not_built_in(path, "netcdf")),
         false => Ok(archive),
     }
 }

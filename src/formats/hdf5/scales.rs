@@ -1,7 +1,7 @@
 //! Dimension scales of HDF5: arrays that a file ties to the axes of others.
 
-use crate::formats::arrays::Variable;
-use crate::formats::arrays::axes::role_of_name;
+use crate::arrays::Variable;
+use crate::arrays::axes::role_of_name;
 use hdf5_reader::Dataset;
 use hdf5_reader::reference::read_object_references;
 use std::collections::HashMap;

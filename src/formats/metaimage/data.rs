@@ -2,16 +2,16 @@
 
 use super::header::MetaImageHeader;
 use super::read::MetaImageSamples;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::formats::shared::deflated::{Compression, Deflated, StreamOffset, check_room};
-use crate::formats::shared::pattern;
-use crate::formats::shared::pieces::{Piece, Pieces, Stream};
-use crate::source::Parsed;
-use crate::source::file_header::check_size;
-use crate::source::layout::Layout;
-use crate::source::parts::{DataLocation, Part};
+use crate::shared::deflated::{Compression, Deflated, StreamOffset, check_room};
+use crate::shared::pattern;
+use crate::shared::pieces::{Piece, Pieces, Stream};
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::file_header::check_size;
+use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::parts::{DataLocation, Part};
 
 /// The files that hold the frames, checked for their size.
 pub(super) fn parts(file: &FileBytes, header: &MetaImageHeader, samples: &MetaImageSamples) -> Result<Vec<Part>> {

@@ -1,9 +1,9 @@
 //! The text of a MetaImage header: fields, and the list of data files that may end it.
 
 use super::layout::is_known;
-use crate::formats::shared::words::shortened;
-use crate::source::Parsed;
+use crate::shared::words::shortened;
 use std::collections::HashMap;
+use wavesplat_core::source::Parsed;
 
 /// The fields of a header, and where it ends.
 #[derive(Debug, Default)]

@@ -3,19 +3,19 @@
 use super::data;
 use super::header::MetaImageHeader;
 use super::layout::{BIG_ENDIAN, NAME, ORIGIN, SPACING, TRANSFORM, TYPES};
-use crate::base::description::{Attribute, AxisRole, Description, LPS, Values};
-use crate::base::error::{Error, Note, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::stored::StoredType;
-use crate::formats::shared::component;
-use crate::formats::shared::directions::{Directions, Placed};
-use crate::formats::shared::words::numbers;
-use crate::source::file_header::{FileHeader, growing_head};
-use crate::source::layout::Shape;
-use crate::source::layout::{Axis, Layout};
-use crate::source::parts::Stored;
-use crate::source::{Advised, Parsed};
+use crate::shared::component;
+use crate::shared::directions::{Directions, Placed};
+use crate::shared::words::numbers;
 use std::path::Path;
+use wavesplat_core::base::description::{Attribute, AxisRole, Description, LPS, Values};
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::file_header::{FileHeader, growing_head};
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::parts::Stored;
+use wavesplat_core::source::{Advised, Parsed};
 
 /// Reads the header and checks the size of every data file.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {

@@ -1,12 +1,12 @@
 //! Tests of MetaImage files.
 
-use crate::base::sample::SampleType;
-use crate::formats::open;
-use crate::formats::testing::{Folder, check_inputs, payload, refused, survives_damage};
-use crate::source::OpenOptions;
+use crate::open;
+use crate::testing::{Folder, check_inputs, payload, refused, survives_damage};
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 use std::io::Write;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::OpenOptions;
 
 fn options() -> OpenOptions {
     OpenOptions::default()
@@ -112,7 +112,7 @@ fn one_component_of_several_is_read() {
         let mut source = open(&file, &named("[y]")).expect("opening");
         assert_eq!(source.archive().variable.as_deref(), Some("samples[1]"));
         check_inputs(&file, &named("samples[x]"), ty, 4);
-        crate::formats::testing::check_window(&*source.window(0, 4).expect("window"), ty, 1);
+        crate::testing::check_window(&*source.window(0, 4).expect("window"), ty, 1);
         refused(&file, &options(), "samples has 2 components; ChooseComponent { name: \"samples\", components: 2 }");
         refused(&file, &named("[2]"), "none with number 2");
         refused(&file, &named("b"), "has no array b");

@@ -1,10 +1,10 @@
 //! The header of a MetaImage with its samples in the same file.
 
 use super::layout::{NAME, TYPES};
-use crate::base::description::RAS;
-use crate::base::sample::SampleType;
-use crate::formats::contents::Contents;
+use crate::contents::Contents;
 use std::io::{self, Write};
+use wavesplat_core::base::description::RAS;
+use wavesplat_core::base::sample::SampleType;
 
 /// Writes the header.
 pub(super) fn write_header(contents: &Contents, ty: SampleType, out: &mut dyn Write) -> io::Result<()> {

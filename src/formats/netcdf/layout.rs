@@ -1,6 +1,6 @@
 //! What classic NetCDF files are made of.
 
-use crate::base::description::NumberType;
+use wavesplat_core::base::description::NumberType;
 
 /// How every classic file starts; the number of its form follows.
 pub(super) const MAGIC: &[u8] = b"CDF";

@@ -1,16 +1,11 @@
 //! NetCDF files, classic and version 4, as [`ArrayFile`].
 
 use super::layout::FILL;
-use crate::base::description::{self, NumberType};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::FileBytes;
-use crate::base::stored::StoredType;
-use crate::formats::arrays::describe::numbers;
-use crate::formats::arrays::hdf5_storage::{self, storage};
-use crate::formats::arrays::in_place::InPlace;
-use crate::formats::arrays::opener::ReadConfig;
-use crate::formats::arrays::{ArrayArchive, ArrayFile, Attribute, Attributes, Variable};
-use crate::source::{OpenOptions, Parsed};
+use crate::arrays::describe::numbers;
+use crate::arrays::hdf5_storage::{self, storage};
+use crate::arrays::in_place::InPlace;
+use crate::arrays::opener::ReadConfig;
+use crate::arrays::{ArrayArchive, ArrayFile, Attribute, Attributes, Variable};
 use hdf5_reader::Hdf5File;
 use netcdf_reader::classic::data::compute_record_stride;
 use netcdf_reader::error::Error as NcError;
@@ -20,6 +15,11 @@ use netcdf_reader::{
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use wavesplat_core::base::description::{self, NumberType};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::FileBytes;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::{OpenOptions, Parsed};
 
 /// The NetCDF library's default fill value of floats.
 const UNWRITTEN: f64 = 9.969_209_968_386_869e36;

@@ -4,11 +4,11 @@
 //! (64-bit counts, more types) if types or lengths need it.
 
 use super::layout::{ALIGNMENT, ATTRIBUTES, DIMENSIONS, FILL, MAGIC, TEXT, VARIABLES, code};
-use crate::base::description::{Attribute, NumberType, Numbers, Values};
-use crate::base::sample::{SampleType, store};
-use crate::formats::contents::Contents;
-use crate::formats::shared::dataset::{Dataset, number_type};
+use crate::contents::Contents;
+use crate::shared::dataset::{Dataset, number_type};
 use std::io::{self, Write};
+use wavesplat_core::base::description::{Attribute, NumberType, Numbers, Values};
+use wavesplat_core::base::sample::{SampleType, store};
 
 /// Writes the header and all variables before the samples.
 pub(super) fn write_header(contents: &Contents, ty: SampleType, out: &mut dyn Write) -> io::Result<()> {
@@ -220,7 +220,7 @@ fn reversed<const N: usize>(mut bytes: [u8; N]) -> [u8; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::contents::testing::contents;
+    use crate::contents::testing::contents;
 
     /// The header and coordinates of samples of a type, and where the header says that the samples begin.
     fn written(contents: &Contents, ty: SampleType) -> (Vec<u8>, usize) {

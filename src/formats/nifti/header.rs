@@ -1,8 +1,8 @@
 //! The header of a NIfTI.
 
 use super::layout::{FIRST, NiftiBytes, SECOND};
-use crate::formats::shared::directions::Directions;
-use crate::source::Parsed;
+use crate::shared::directions::Directions;
+use wavesplat_core::source::Parsed;
 
 /// Bytes of the longest header.
 pub(super) const LONGEST: usize = SECOND;

@@ -1,8 +1,8 @@
 //! The fields and codes of a NIfTI header. It has 348 bytes in version 1 and 540 in version 2, in
 //! either byte order.
 
-use crate::base::stored::StoredType;
-use crate::formats::shared::types::Types;
+use crate::shared::types::Types;
+use wavesplat_core::base::stored::StoredType;
 
 /// Bytes of the header of version 1.
 pub(super) const FIRST: usize = 348;

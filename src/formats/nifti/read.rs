@@ -2,21 +2,23 @@
 
 use super::header::{LONGEST, NiftiHeader, is_nifti};
 use super::layout::{DATATYPES, OTHER_UNITS, SPACE_UNITS, TIME_UNITS, UNSUPPORTED};
-use crate::base::description::{Attribute, AxisRole, Description, NIFTI_HEADER, NumberType, Numbers, RAS, Values};
-use crate::base::error::{Error, Note, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::stored::StoredType;
-use crate::formats::shared::component;
-use crate::formats::shared::deflated::{Compression, Stream};
-use crate::formats::shared::extension::extension;
-use crate::source::file_header::{FileHeader, Units, check_size, head};
-use crate::source::layout::Shape;
-use crate::source::layout::{Axis, Layout};
-use crate::source::packing::Packing;
-use crate::source::parts::{DataLocation, Part, Stored};
-use crate::source::{Advised, Parsed};
+use crate::shared::component;
+use crate::shared::deflated::{Compression, Stream};
+use crate::shared::extension::extension;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::description::{
+    Attribute, AxisRole, Description, NIFTI_HEADER, NumberType, Numbers, RAS, Values,
+};
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::file_header::{FileHeader, Units, check_size, head};
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::packing::Packing;
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
+use wavesplat_core::source::{Advised, Parsed};
 
 const GZIP: &[u8] = b"\x1f\x8b";
 

@@ -1,12 +1,12 @@
 //! Tests of NIfTI files.
 
-use crate::base::sample::SampleType;
-use crate::formats::open;
-use crate::formats::testing::{Folder, check_inputs, message, payload, refused, survives_damage};
-use crate::source::{Archive, OpenOptions};
+use crate::open;
+use crate::testing::{Folder, check_inputs, message, payload, refused, survives_damage};
 use flate2::Compression as Level;
 use flate2::write::GzEncoder;
 use std::io::Write;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::{Archive, OpenOptions};
 
 /// Places of fields in version 1 and version 2.
 const DIM: [usize; 2] = [40, 16];

@@ -2,10 +2,10 @@
 //! or version 2 if the source or a length needs it.
 
 use super::layout::{DATATYPES, FIRST, NiftiBytes, SECOND, SPACE_UNITS, TIME_UNITS};
-use crate::base::description::{LPS, NIFTI_HEADER, Values};
-use crate::base::sample::SampleType;
-use crate::formats::contents::{Contents, Lattice};
+use crate::contents::{Contents, Lattice};
 use std::io::{self, Write};
+use wavesplat_core::base::description::{LPS, NIFTI_HEADER, Values};
+use wavesplat_core::base::sample::SampleType;
 
 /// Bytes between the header and the samples: there are no extensions.
 const GAP: usize = 4;
@@ -177,7 +177,7 @@ fn units(contents: &Contents) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::contents::testing::contents;
+    use crate::contents::testing::contents;
 
     fn written(contents: &Contents) -> NiftiBytes<Vec<u8>> {
         let mut bytes = Vec::new();

@@ -7,7 +7,7 @@ pub use read::{ArrayHeader, array_header};
 
 use super::format::{Choices, Format, Reader};
 use super::writer::Writer;
-use crate::base::npy::{MAGIC, write_header};
+use wavesplat_core::base::npy::{MAGIC, write_header};
 
 pub(crate) static FORMAT: Format = Format {
     name: "NumPy array",

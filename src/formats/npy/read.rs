@@ -1,18 +1,18 @@
 //! Reads NumPy's `.npy`.
 
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::npy::{Header, MAGIC};
-use crate::base::sample::SampleType;
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
-use crate::source::file_header::{FileHeader, check_size};
-use crate::source::layout::Layout;
-use crate::source::layout::Shape;
-use crate::source::parts::{DataLocation, Part, Stored};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::npy::{Header, MAGIC};
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::file_header::{FileHeader, check_size};
+use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
 
@@ -184,8 +184,8 @@ fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::testing::{Folder, check_inputs, payload, refused, survives_damage};
-    use crate::source::OpenOptions;
+    use crate::testing::{Folder, check_inputs, payload, refused, survives_damage};
+    use wavesplat_core::source::OpenOptions;
 
     fn npy(version: u8, dict: &str, payload: &[u8]) -> Vec<u8> {
         let text = format!("{dict}\n");
@@ -279,7 +279,7 @@ mod tests {
         let values = (0..24).map(|i| if i == 21 { -5_000_000_000 } else { i });
         let stored: Vec<u8> = values.flat_map(i64::to_le_bytes).collect();
         let file = folder.write("a.npy", npy(1, &dict("'<i8'", "(2, 3, 2, 2)"), &stored));
-        let mut source = crate::formats::open(&[file], &OpenOptions::default()).expect("a header");
+        let mut source = crate::open(&[file], &OpenOptions::default()).expect("a header");
         let (whole, mut out) = (source.archive().grid.whole(), vec![0; 48]);
         let window = source.window(0, 2).expect("frames");
         window.read_box(0, &whole, &mut out).expect("a frame whose integers fit");
@@ -311,7 +311,7 @@ mod tests {
         let good = npy(2, &dict("'<f4'", "(2, 2, 4)"), &[0; 64]);
         for len in 0..good.len() {
             let file = folder.write("a.npy", &good[..len]);
-            assert!(crate::formats::open(&[file], &OpenOptions::default()).is_err(), "{len} bytes");
+            assert!(crate::open(&[file], &OpenOptions::default()).is_err(), "{len} bytes");
         }
         let mut huge = good.clone();
         huge[8..12].copy_from_slice(&u32::MAX.to_le_bytes());

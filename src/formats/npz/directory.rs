@@ -1,9 +1,9 @@
 //! The directory at the end of a zip archive: the name of each file in it, and where its bytes are.
 
-use crate::base::error::{Error, Result};
-use crate::base::mapped::FileBytes;
-use crate::formats::shared::deflated::{Compression, check_room};
-use crate::source::Parsed;
+use crate::shared::deflated::{Compression, check_room};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::FileBytes;
+use wavesplat_core::source::Parsed;
 
 const MOST_END: u64 = 22 + 65_535; // bytes of the last record, with its comment
 const MOST_BYTES: u64 = 64 << 20; // of the directory

@@ -1,17 +1,17 @@
 //! Reads NumPy's `.npz`.
 
 use super::directory::{self, Member};
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::formats::npy::{self, Array};
-use crate::formats::numbering;
-use crate::formats::shared::deflated::{FileReader, Stream};
-use crate::source::file_header::FileHeader;
-use crate::source::parts::{DataLocation, Part, Stored};
-use crate::source::{Advised, OpenOptions, VariableInfo, variables};
+use crate::npy::{self, Array};
+use crate::numbering;
+use crate::shared::deflated::{FileReader, Stream};
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::source::file_header::FileHeader;
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
+use wavesplat_core::source::{Advised, OpenOptions, VariableInfo, variables};
 
 /// The placeholder for the number in the names of arrays that are frames.
 const STEP: &str = "%T";

@@ -1,10 +1,10 @@
-use crate::base::npy::write_header;
-use crate::base::sample::SampleType;
-use crate::formats::testing::{Folder, check_inputs, payload, refused, survives_damage};
-use crate::source::OpenOptions;
+use crate::testing::{Folder, check_inputs, payload, refused, survives_damage};
 use flate2::write::DeflateEncoder;
 use flate2::{Compression, Crc};
 use std::io::Write;
+use wavesplat_core::base::npy::write_header;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::OpenOptions;
 
 /// A member of an archive.
 struct Member {
@@ -110,7 +110,7 @@ fn one_of_several_variables_is_chosen() {
         [member("p.npy", &FRAME, 0..1, 0), member("q.npy", &FRAME, 1..2, 8), member("r1.npy", &FRAME, 2..3, 0)];
     let file = [folder.write("a.npz", zip(&members, false))];
     refused(&file, &OpenOptions::default(), "has 3 variables, not one:\n  p: f32 (z 3, y 5, x 7)");
-    assert_eq!(crate::formats::undecided(&file, &OpenOptions::default()).expect("read").len(), 3);
+    assert_eq!(crate::undecided(&file, &OpenOptions::default()).expect("read").len(), 3);
     let options = |name: &str| OpenOptions { variable: Some(name.into()), ..OpenOptions::default() };
     check_inputs(&file, &options("p"), SampleType::F32, 1);
     refused(&file, &options("s"), "has no array s; it has\n  p: f32");
@@ -152,7 +152,7 @@ fn what_cannot_be_is_refused() {
     let good = one(0);
     for cut in 0..good.len() - 3 {
         let file = folder.write("a.npz", &good[..cut]);
-        assert!(crate::formats::open(&[file], &OpenOptions::default()).is_err(), "{cut} bytes");
+        assert!(crate::open(&[file], &OpenOptions::default()).is_err(), "{cut} bytes");
     }
 }
 
@@ -171,7 +171,7 @@ fn a_wrong_checksum_is_noticed() {
     let mut bytes = zip(&[member("u.npy", &FRAME, 0..1, 8)], false);
     let entry = bytes.windows(4).rposition(|w| w == b"PK\x01\x02").expect("a directory");
     bytes[entry + 16] ^= 1;
-    let mut source = crate::formats::open(&[folder.write("a.npz", bytes)], &OpenOptions::default()).expect("a header");
+    let mut source = crate::open(&[folder.write("a.npz", bytes)], &OpenOptions::default()).expect("a header");
     let error = source.window(0, 1).err().expect("a wrong checksum").to_string();
     assert!(error.contains("checksum"), "{error}");
 }

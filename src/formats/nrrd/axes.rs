@@ -1,10 +1,10 @@
 //! What the axes of a NRRD count, and where they lie in the world.
 
 use super::header::{NrrdHeader, vectors};
-use crate::formats::shared::directions::Directions;
-use crate::formats::shared::words::{list, numbers};
-use crate::source::Parsed;
-use crate::source::file_header::Units;
+use crate::shared::directions::Directions;
+use crate::shared::words::{list, numbers};
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::file_header::Units;
 
 /// The axes of an array, numbered from the fastest as in the file.
 #[derive(Debug)]

@@ -3,16 +3,16 @@
 use super::files::DataFiles;
 use super::header::NrrdHeader;
 use super::read::NrrdSamples;
-use crate::base::description::AxisRole;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::formats::shared::deflated::{Compression, Stream, check_room};
-use crate::formats::shared::pieces::{self, Piece, Pieces};
-use crate::source::Parsed;
-use crate::source::file_header::check_size;
-use crate::source::layout::Layout;
-use crate::source::parts::{DataLocation, Part, Stored};
+use crate::shared::deflated::{Compression, Stream, check_room};
+use crate::shared::pieces::{self, Piece, Pieces};
 use std::path::Path;
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::file_header::check_size;
+use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
 
 const PIECE: usize = 64 << 10; // bytes read at a time when lines are counted
 

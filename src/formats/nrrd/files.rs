@@ -1,7 +1,7 @@
 //! The names of the data files of a NRRD.
 
-use crate::formats::shared::pattern;
-use crate::source::Parsed;
+use crate::shared::pattern;
+use wavesplat_core::source::Parsed;
 
 /// What `data file` says.
 pub(super) enum DataFiles {

@@ -1,8 +1,8 @@
 //! The text of a NRRD header: fields, and the list of data files that may end it.
 
 use super::layout::MAGIC;
-use crate::source::Parsed;
 use std::collections::HashMap;
+use wavesplat_core::source::Parsed;
 
 /// The fields of a header, and where it ends.
 #[derive(Debug)]

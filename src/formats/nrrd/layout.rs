@@ -1,7 +1,7 @@
 //! The magic of a NRRD, and its types.
 
-use crate::base::stored::StoredType;
-use crate::formats::shared::types::Types;
+use crate::shared::types::Types;
+use wavesplat_core::base::stored::StoredType;
 
 /// The format's name, also in descriptions.
 pub(super) const NAME: &str = "NRRD";

@@ -4,17 +4,17 @@ use super::axes::Axes;
 use super::data;
 use super::header::NrrdHeader;
 use super::layout::{NAME, TYPES};
-use crate::base::description::{Attribute, AxisRole, Description, Values};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::stored::StoredType;
-use crate::formats::shared::component;
-use crate::formats::shared::directions::Placed;
-use crate::source::file_header::{FileHeader, growing_head};
-use crate::source::layout::Shape;
-use crate::source::layout::{Axis, Layout};
-use crate::source::{Advised, Parsed};
+use crate::shared::component;
+use crate::shared::directions::Placed;
 use std::path::Path;
+use wavesplat_core::base::description::{Attribute, AxisRole, Description, Values};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::file_header::{FileHeader, growing_head};
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::{Advised, Parsed};
 
 /// Reads the header and checks the size of every data file that is not compressed.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {

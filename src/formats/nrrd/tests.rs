@@ -1,12 +1,12 @@
 //! Tests of NRRD files.
 
-use crate::base::sample::SampleType;
-use crate::formats::open;
-use crate::formats::testing::{Folder, check_inputs, message, payload, refused, survives_damage};
-use crate::source::OpenOptions;
+use crate::open;
+use crate::testing::{Folder, check_inputs, message, payload, refused, survives_damage};
 use flate2::Compression as Level;
 use flate2::write::GzEncoder;
 use std::io::Write;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::OpenOptions;
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut packed = GzEncoder::new(Vec::new(), Level::fast());
@@ -55,7 +55,7 @@ fn the_grid_and_times_are_read() {
     let a = archive(units);
     assert_eq!([a.units.samples, a.units.times, a.units.space].map(Option::unwrap_or_default), ["K", "s", "mm"]);
     let a = archive("space units: \"mm\" \"mm\" \"um\"\nunits: \"\" \"\" \"\" \"???\"\n");
-    assert_eq!(a.units, crate::source::Units::default());
+    assert_eq!(a.units, wavesplat_core::source::Units::default());
     let a = archive("space directions: (2,0,0,0) (0,3,0,0) (0,0,4,0) (0,0,0,0.5)\nspace origin: (1,-1,0.5,7)\n");
     assert_eq!((a.grid.origin, a.times), ([1.0, -1.0, 0.5], vec![7.0, 7.5, 8.0, 8.5]));
     let a = archive("space dimension: 3\nspace directions: (2,0,0) (0,3,0) (0,0,4) none\nspace origin: (1,-1,0.5)\n");

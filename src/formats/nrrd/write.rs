@@ -1,10 +1,10 @@
 //! Writes the header of a NRRD.
 
 use super::layout::{NAME, TYPES};
-use crate::base::sample::SampleType;
-use crate::formats::contents::{Contents, Lattice, plain};
+use crate::contents::{Contents, Lattice, plain};
 use std::fmt::Display;
 use std::io::{self, Write};
+use wavesplat_core::base::sample::SampleType;
 
 /// Writes the header of an attached file, or of one with its samples in the file `data` of the same folder.
 pub(super) fn write_header(
@@ -69,7 +69,7 @@ fn joined(numbers: [impl Display; 3], between: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::contents::testing::contents;
+    use crate::contents::testing::contents;
 
     #[test]
     fn units_are_told_where_there_are_axes_for_them() {

@@ -1,18 +1,18 @@
 //! Expands the inputs of the user to a list of files in the order of time.
 
 use super::{by_name, has_header};
-use crate::base::address::refuse_frames;
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::base::output::STANDARD;
-use crate::formats::format::{Format, Reader};
-use crate::formats::shared::extension::extension;
-use crate::formats::zarr::metadata_file;
-use crate::formats::{file_series, numbering, vtk, vtk_xml};
-use crate::source::OpenOptions;
-use crate::source::series::FrameFiles;
+use crate::format::{Format, Reader};
+use crate::shared::extension::extension;
+use crate::zarr::metadata_file;
+use crate::{file_series, numbering, vtk, vtk_xml};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::address::refuse_frames;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::source::OpenOptions;
+use wavesplat_core::source::series::FrameFiles;
 
 /// The files that the inputs stand for.
 pub(crate) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameFiles> {
@@ -183,8 +183,8 @@ fn name(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::sample::SampleType;
-    use crate::formats::testing::{DIMS, Folder, check_inputs, payload, refused};
+    use crate::testing::{DIMS, Folder, check_inputs, payload, refused};
+    use wavesplat_core::base::sample::SampleType;
 
     const TY: SampleType = SampleType::U16;
 
@@ -236,7 +236,7 @@ mod tests {
         for inputs in [files.clone(), vec![folder.path("")], vec![folder.path("*.raw")]] {
             refused(&inputs, &raw(), "f2.raw is followed by f4.raw");
             let options = OpenOptions { allow_gaps: true, ..raw() };
-            assert_eq!(crate::formats::open(&inputs, &options).expect("gaps").archive().frames, Some(4));
+            assert_eq!(crate::open(&inputs, &options).expect("gaps").archive().frames, Some(4));
         }
     }
 

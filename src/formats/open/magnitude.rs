@@ -1,11 +1,11 @@
 //! The length of a vector: several variables of an archive as one.
 
-use crate::base::description::{Attribute, Values};
-use crate::base::error::{Error, Result};
-use crate::base::grid::Region;
-use crate::base::sample::{SampleType, is_missing, load, store};
-use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions};
 use std::path::PathBuf;
+use wavesplat_core::base::description::{Attribute, Values};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::sample::{SampleType, is_missing, load, store};
+use wavesplat_core::source::{Archive, FrameSource, FrameWindow, OpenOptions};
 
 /// Name of the variable that stands for the length.
 const NAME: &str = "magnitude";

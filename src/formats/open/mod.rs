@@ -11,15 +11,15 @@ use super::arrays::held::{self, NamedArrays};
 use super::format::{Choices, Format, Reader};
 use super::shared::extension::extension;
 use super::{FORMATS, nifti, npy, raw, zarr};
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::output::STANDARD;
-use crate::source::file_header::{FileHeader, head};
-use crate::source::series::Series;
-use crate::source::{Extent, FrameSource, OpenOptions, VariableInfo};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::source::file_header::{FileHeader, head};
+use wavesplat_core::source::series::Series;
+use wavesplat_core::source::{Extent, FrameSource, OpenOptions, VariableInfo};
 
 /// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`,
 /// `.series`), or `-` for standard input.

@@ -1,11 +1,11 @@
 //! Tests of files as one archive.
 
 use super::open;
-use crate::base::error::Error;
-use crate::base::grid::Grid;
-use crate::base::sample::SampleType;
-use crate::formats::testing::{DIMS, Folder, check_window, message, payload, refused};
-use crate::source::{Archive, OpenOptions};
+use crate::testing::{DIMS, Folder, check_window, message, payload, refused};
+use wavesplat_core::base::error::Error;
+use wavesplat_core::base::grid::Grid;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::{Archive, OpenOptions};
 
 fn raw() -> OpenOptions {
     OpenOptions { dims: Some(DIMS.into()), sample: Some(SampleType::U8), ..OpenOptions::default() }

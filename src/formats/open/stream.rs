@@ -1,21 +1,21 @@
 //! Frames from a pipe, raw or as arrays of NumPy: forward only, one window held at a time, in memory or in a temporary file.
 
 use super::refuse_options;
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::base::grid::Grid;
-use crate::base::npy::MAGIC;
-use crate::base::output::STANDARD;
-use crate::base::stored::StoredType;
-use crate::formats::{npy, raw};
-use crate::source::frames::{Bytes, Frame, Frames};
-use crate::source::layout::Shape;
-use crate::source::parts::Stored;
-use crate::source::series::{check_grid, override_grid};
-use crate::source::spill_buffer::{SpillBuffer, read_some};
-use crate::source::{Archive, FrameSource, FrameWindow, OpenOptions, times};
+use crate::{npy, raw};
 use std::io::{self, Chain, Cursor, Read};
 use std::path::Path;
 use std::sync::Arc;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::grid::Grid;
+use wavesplat_core::base::npy::MAGIC;
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::frames::{Bytes, Frame, Frames};
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::parts::Stored;
+use wavesplat_core::source::series::{check_grid, override_grid};
+use wavesplat_core::source::spill_buffer::{SpillBuffer, read_some};
+use wavesplat_core::source::{Archive, FrameSource, FrameWindow, OpenOptions, times};
 
 const CHUNK: usize = 1 << 20; // bytes asked for at a time
 

@@ -2,10 +2,10 @@
 
 use super::text::Characters;
 use super::words::wrong;
-use crate::base::mapped::FileBytes;
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
 use std::io::{self, Read};
+use wavesplat_core::base::mapped::FileBytes;
 
 const GROUP: usize = 4; // characters that are decoded together
 

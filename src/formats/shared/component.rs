@@ -1,7 +1,7 @@
 //! One component of a vector, as the option `variable` names it.
 
-use crate::base::error::{Note, Remedy};
-use crate::source::Advised;
+use wavesplat_core::base::error::{Note, Remedy};
+use wavesplat_core::source::Advised;
 
 /// A variable's name, and its component if one is given: `velocity[1]` and `velocity[y]` are the second component.
 pub(crate) fn named(variable: &str) -> (&str, Option<usize>) {

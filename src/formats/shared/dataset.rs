@@ -1,13 +1,13 @@
 //! Extracted samples as a dataset: dimensions, variables and attributes, for formats that hold all of them (NetCDF,
 //! Zarr). With a description it is that of the source; without one it has times and positions.
 
-use crate::base::description::{
+use crate::contents::Contents;
+use std::collections::BTreeSet;
+use wavesplat_core::base::description::{
     Attribute, AxisRole, Description, NIFTI_HEADER, NumberType, Numbers, Values, coordinates,
 };
-use crate::base::sample::{SampleType, store};
-use crate::base::stored::StoredType;
-use crate::formats::contents::Contents;
-use std::collections::BTreeSet;
+use wavesplat_core::base::sample::{SampleType, store};
+use wavesplat_core::base::stored::StoredType;
 
 /// Everything of a file but the samples themselves.
 #[derive(Debug)]
@@ -115,7 +115,7 @@ fn samples_attributes(contents: &Contents, description: &Description) -> Vec<Att
 fn named_dimensions(description: &Description) -> Vec<(String, u64)> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
     let role = |number: usize| description.axes.iter().find(|axis| axis.dimension as usize == number).map(|a| a.role);
-    let named = |(number, dimension): (usize, &crate::base::description::Dimension)| {
+    let named = |(number, dimension): (usize, &wavesplat_core::base::description::Dimension)| {
         let fallback = match role(number) {
             Some(AxisRole::Frames) => NAMES[0].to_string(),
             Some(role) => role.voxels().map_or_else(|| format!("dim_{number}"), |axis| NAMES[axis + 1].into()),
@@ -136,7 +136,7 @@ fn lattice(contents: &Contents, description: &Description, dimensions: &[(String
     let (grid, has_own) = (&contents.grid, (0..3).any(|axis| coordinates(description, axis).is_some()));
     let is_placed = grid.spacing != [1.0; 3] || grid.origin != [0.0; 3];
     let time = description.variables.iter().any(|variable| matches!(variable.values, Values::Times(_)));
-    let axis = |axis: &crate::base::description::ArrayAxis| {
+    let axis = |axis: &wavesplat_core::base::description::ArrayAxis| {
         let name = match axis.role.voxels() {
             Some(along) if !has_own && is_placed => NAMES[along + 1],
             None if axis.role == AxisRole::Frames && !time && !contents.numbered => NAMES[0],

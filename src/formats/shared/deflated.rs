@@ -1,20 +1,20 @@
 //! Frames in one compressed stream of deflate, gzip or zlib. Going back to an earlier frame starts again from the beginning.
 
-use crate::base::description::AxisRole;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes, State};
-use crate::base::stored::StoredType;
-use crate::formats::shared::words::wrong;
-use crate::source::Parsed;
-use crate::source::layout::Layout;
-use crate::source::parts::{DataLocation, Decode, Part, Stored};
-use crate::source::spill_buffer::{SpillBuffer, read_some};
+use crate::shared::words::wrong;
 use flate2::Crc;
 use flate2::read::{DeflateDecoder, MultiGzDecoder, ZlibDecoder};
 use std::fmt;
 use std::io::{self, BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes, State};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::parts::{DataLocation, Decode, Part, Stored};
+use wavesplat_core::source::spill_buffer::{SpillBuffer, read_some};
 
 const CHUNK: usize = 1 << 20; // bytes taken at a time
 const MOST: u64 = 1032; // bytes that one compressed byte can stand for

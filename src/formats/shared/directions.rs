@@ -1,9 +1,9 @@
 //! The directions of an array's axes in the world: along the world's axes in any order and direction, or oblique.
 
-use crate::base::description::{ArrayAxis, AxisRole, Description, Dimension, Orientation};
-use crate::base::error::Note;
-use crate::source::Parsed;
-use crate::source::layout::{Axis, Layout};
+use wavesplat_core::base::description::{ArrayAxis, AxisRole, Description, Dimension, Orientation};
+use wavesplat_core::base::error::Note;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::layout::{Axis, Layout};
 
 /// Deviations from an axis by less than this share of a step count as straight: they are not visible.
 const SLANT: f64 = 1e-3;

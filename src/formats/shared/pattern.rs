@@ -1,6 +1,6 @@
 //! File names from a printf pattern and a range of numbers.
 
-use crate::source::Parsed;
+use wavesplat_core::source::Parsed;
 
 /// The count of numbers from the first to the last, both included.
 pub(crate) fn count(first: i64, last: i64, step: i64) -> Parsed<usize> {

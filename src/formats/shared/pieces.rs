@@ -1,14 +1,14 @@
 //! Frames assembled from pieces. A piece is a box of voxels that is decoded from its first byte to its last.
 
 use super::deflated::{Compression, FileReader, expect_end, hold};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes, State};
-use crate::source::parts::Decode;
-use crate::source::spill_buffer::SpillBuffer;
 use std::fmt::Debug;
 use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes, State};
+use wavesplat_core::source::parts::Decode;
+use wavesplat_core::source::spill_buffer::SpillBuffer;
 
 /// The samples of a piece in their file.
 pub(crate) trait Packed: Debug + Send {

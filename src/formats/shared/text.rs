@@ -2,10 +2,10 @@
 
 use super::pieces::Packed;
 use super::words::wrong;
-use crate::base::mapped::FileBytes;
-use crate::base::sample::{self, SampleType};
-use crate::base::stored::StoredType;
 use std::io::{self, Read};
+use wavesplat_core::base::mapped::FileBytes;
+use wavesplat_core::base::sample::{self, SampleType};
+use wavesplat_core::base::stored::StoredType;
 
 const PIECE: usize = 64 << 10; // bytes read at a time
 

@@ -1,6 +1,6 @@
 //! What formats call the types of numbers.
 
-use crate::base::stored::StoredType;
+use wavesplat_core::base::stored::StoredType;
 
 /// The names of types in a format, or their codes. Of several for one type, the first is written.
 pub(crate) struct Types<K: 'static>(pub(crate) &'static [(StoredType, &'static [K])]);

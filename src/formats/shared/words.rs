@@ -1,8 +1,8 @@
 //! Numbers in the text of headers, and messages about text that is wrong.
 
-use crate::source::Parsed;
 use std::io::{self, ErrorKind};
 use std::str::FromStr;
+use wavesplat_core::source::Parsed;
 
 /// A number.
 pub(crate) fn number<T: FromStr>(text: &str, what: &str) -> Parsed<T> {

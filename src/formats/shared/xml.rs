@@ -1,8 +1,8 @@
 //! The little of XML that `.vti` and `.pvd` need.
 
-use crate::source::Parsed;
 use quick_xml::XmlVersion;
 use quick_xml::events::BytesStart;
+use wavesplat_core::source::Parsed;
 
 /// An attribute's text, if the element has it.
 pub(crate) fn attribute(element: &BytesStart<'_>, name: &str) -> Parsed<Option<String>> {

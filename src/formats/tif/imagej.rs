@@ -1,8 +1,8 @@
 //! The text that ImageJ writes into the first page: lines such as `slices=5`. Channels are fastest, then planes, then frames.
 
 use super::stack::{Stack, positive};
-use crate::formats::shared::words::number;
-use crate::source::Parsed;
+use crate::shared::words::number;
+use wavesplat_core::source::Parsed;
 
 /// How it starts.
 pub(super) const START: &str = "ImageJ=";

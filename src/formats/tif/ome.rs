@@ -1,11 +1,11 @@
 //! The XML that the Open Microscopy Environment writes into the first page.
 
 use super::stack::{Stack, positive};
-use crate::formats::shared::words::number;
-use crate::formats::shared::xml::{attribute, required};
-use crate::source::Parsed;
+use crate::shared::words::number;
+use crate::shared::xml::{attribute, required};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
+use wavesplat_core::source::Parsed;
 
 /// Units of length in micrometres, and their names here.
 const LENGTHS: [(&str, &str, f64); 8] = [

@@ -1,10 +1,5 @@
 //! The pages of a file, decoded strip by strip or tile by tile.
 
-use crate::base::error::{Error, Result};
-use crate::base::stored::StoredType;
-use crate::source::Parsed;
-use crate::source::layout::Layout;
-use crate::source::spill_buffer::SpillBuffer;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -12,6 +7,11 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingSampleType, Limits};
 use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::spill_buffer::SpillBuffer;
 
 const MOST_TEXT: usize = 64 << 20; // bytes of a description, or of a page's list of strips
 

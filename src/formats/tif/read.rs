@@ -2,17 +2,17 @@
 
 use super::pages::{Page, Pages};
 use super::stack::Stack;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::formats::shared::component;
-use crate::source::file_header::{FileHeader, Units};
-use crate::source::layout::{Layout, Shape};
-use crate::source::parts::{DataLocation, Decode, Part, Stored};
-use crate::source::spill_buffer::SpillBuffer;
-use crate::source::{Advised, OpenOptions, Parsed};
+use crate::shared::component;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::source::file_header::{FileHeader, Units};
+use wavesplat_core::source::layout::{Layout, Shape};
+use wavesplat_core::source::parts::{DataLocation, Decode, Part, Stored};
+use wavesplat_core::source::spill_buffer::SpillBuffer;
+use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 
 /// The bytes decoded at once may use 1/4 of the memory for a window.
 const SHARE: usize = 4;

@@ -1,7 +1,7 @@
 //! How the pages of a file make up frames.
 
 use super::{imagej, ome};
-use crate::source::Parsed;
+use wavesplat_core::source::Parsed;
 
 /// Pages as planes of frames.
 #[derive(Debug, Clone, PartialEq)]

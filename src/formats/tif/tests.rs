@@ -1,12 +1,12 @@
 use super::stack::Stack;
-use crate::base::sample::{SampleType, load};
-use crate::formats::testing::{DIMS, Folder, check_inputs, payload, refused, survives_damage};
-use crate::source::OpenOptions;
+use crate::testing::{DIMS, Folder, check_inputs, payload, refused, survives_damage};
 use std::io::Cursor;
 use std::path::PathBuf;
 use tiff::encoder::colortype::{ColorType, Gray8, Gray16, Gray32Float, GrayI16, RGB8};
 use tiff::encoder::{Compression, DeflateLevel, Rational, TiffEncoder, TiffValue};
 use tiff::tags::Tag;
+use wavesplat_core::base::sample::{SampleType, load};
+use wavesplat_core::source::OpenOptions;
 
 /// The planes of some frames as numbers.
 fn planes(ty: SampleType, frames: std::ops::Range<usize>) -> Vec<Vec<f64>> {
@@ -66,7 +66,7 @@ fn imagej_says_planes_frames_and_channels() {
     let text = "ImageJ=1.54f\nimages=12\nslices=3\nframes=4\nhyperstack=true\nunit=micron\nspacing=2\nfinterval=0.5\n";
     let file = one(&folder, floats(&planes(SampleType::F32, 0..4), text));
     check_inputs(&file, &OpenOptions::default(), SampleType::F32, 4);
-    let source = crate::formats::open(&file, &OpenOptions::default()).expect("a header");
+    let source = crate::open(&file, &OpenOptions::default()).expect("a header");
     let found = source.archive();
     assert_eq!((found.grid.spacing, &found.times[..]), ([0.5, 1.0, 2.0], &[0.0, 0.5, 1.0, 1.5][..]));
     assert_eq!((found.units.space.as_deref(), found.units.times.as_deref()), (Some("um"), Some("s")));
@@ -75,7 +75,7 @@ fn imagej_says_planes_frames_and_channels() {
     let chosen = OpenOptions { variable: Some("[1]".into()), ..OpenOptions::default() };
     check_inputs(&file, &chosen, SampleType::F32, 1);
     refused(&file, &OpenOptions::default(), "2 components");
-    assert_eq!(crate::formats::undecided(&file, &OpenOptions::default()).expect("read").len(), 2);
+    assert_eq!(crate::undecided(&file, &OpenOptions::default()).expect("read").len(), 2);
 }
 
 fn ome(order: &str, sizes: [usize; 3], more: &str) -> String {
@@ -96,7 +96,7 @@ fn ome_xml_says_the_order_of_planes() {
         let place = "<TiffData IFD=\"0\" PlaneCount=\"12\"/>";
         let file = one(&folder, floats(pages, &ome(order, [3, 1, 4], place)));
         check_inputs(&file, &OpenOptions::default(), SampleType::F32, 4);
-        let source = crate::formats::open(&file, &OpenOptions::default()).expect("a header");
+        let source = crate::open(&file, &OpenOptions::default()).expect("a header");
         assert_eq!(source.archive().grid.spacing, [0.5, 1.0, 2.0]);
         assert_eq!(source.archive().times, [0.0, 0.5, 1.0, 1.5]);
         assert_eq!(source.archive().units.space.as_deref(), Some("um"));

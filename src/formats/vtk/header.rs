@@ -1,18 +1,18 @@
 //! The text of a legacy VTK file, and where its arrays are.
 
 use super::lines::Lines;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::sample;
-use crate::base::stored::StoredType;
-use crate::base::text::percent_decoded;
-use crate::formats::shared::association::Association;
-use crate::formats::shared::pieces::Packed;
-use crate::formats::shared::text::Words;
-use crate::formats::shared::types::Types;
-use crate::formats::shared::words::{array, number, shortened};
-use crate::source::Parsed;
+use crate::shared::association::Association;
+use crate::shared::pieces::Packed;
+use crate::shared::text::Words;
+use crate::shared::types::Types;
+use crate::shared::words::{array, number, shortened};
 use std::io::Read;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::sample;
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::base::text::percent_decoded;
+use wavesplat_core::source::Parsed;
 
 /// How every such file starts.
 pub(crate) const MAGIC: &[u8] = b"# vtk DataFile";

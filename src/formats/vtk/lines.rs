@@ -1,7 +1,7 @@
 //! The text between the binary arrays of a file.
 
-use crate::base::error::{Error, Result};
-use crate::base::mapped::FileBytes;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::FileBytes;
 
 const PIECE: usize = 256; // bytes read at a time
 const LONGEST: usize = 16 << 10; // bytes of a line

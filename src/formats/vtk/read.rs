@@ -1,18 +1,18 @@
 //! Reads VTK's legacy files.
 
 use super::header::{VtkArray, VtkHeader, stored_type};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::stored::StoredType;
-use crate::formats::shared::component::{self, Chosen};
-use crate::formats::shared::pieces::{Piece, Pieces};
-use crate::formats::shared::text::Words;
-use crate::source::file_header::FileHeader;
-use crate::source::layout::Shape;
-use crate::source::layout::{Axis, Layout};
-use crate::source::parts::{DataLocation, Part, Stored};
-use crate::source::{Parsed, VariableInfo};
+use crate::shared::component::{self, Chosen};
+use crate::shared::pieces::{Piece, Pieces};
+use crate::shared::text::Words;
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::file_header::FileHeader;
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
+use wavesplat_core::source::{Parsed, VariableInfo};
 
 /// Goes through the text of one file and finds the array.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {

@@ -1,9 +1,9 @@
 //! Tests of legacy VTK files.
 
-use crate::base::sample::SampleType;
-use crate::formats::open;
-use crate::formats::testing::{Folder, check_inputs, check_window, message, payload, refused, survives_damage, value};
-use crate::source::OpenOptions;
+use crate::open;
+use crate::testing::{Folder, check_inputs, check_window, message, payload, refused, survives_damage, value};
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::OpenOptions;
 
 const DIMS: &str = "DIMENSIONS 7 5 3\nSPACING 0.5 1 2\nORIGIN 1 2 3\n";
 

@@ -1,7 +1,7 @@
 //! The names of types in VTK's XML.
 
-use crate::base::stored::StoredType;
-use crate::formats::shared::types::Types;
+use crate::shared::types::Types;
+use wavesplat_core::base::stored::StoredType;
 
 pub(super) const TYPES: Types<&str> = Types(&[
     (StoredType::U8, &["UInt8"]),

@@ -1,10 +1,7 @@
 //! ParaView's `.pvd`: a list of files and their times, read and written.
 
-use crate::base::error::{Error, Result};
-use crate::formats::contents::Contents;
-use crate::formats::shared::xml::{attribute, required};
-use crate::source::Parsed;
-use crate::source::series::FrameFiles;
+use crate::contents::Contents;
+use crate::shared::xml::{attribute, required};
 use quick_xml::Reader;
 use quick_xml::escape::escape;
 use quick_xml::events::{BytesStart, Event};
@@ -12,6 +9,9 @@ use std::collections::HashSet;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::series::FrameFiles;
 
 /// Reads the list; its files are found from its own folder.
 pub(crate) fn read(path: &Path) -> Result<FrameFiles> {
@@ -86,10 +86,10 @@ pub(super) fn write(
 #[cfg(test)]
 mod tests {
     use super::write;
-    use crate::formats::contents::testing::contents;
-    use crate::formats::open;
-    use crate::formats::testing::{Folder, refused};
-    use crate::source::OpenOptions;
+    use crate::contents::testing::contents;
+    use crate::open;
+    use crate::testing::{Folder, refused};
+    use wavesplat_core::source::OpenOptions;
 
     const NPY: &[u8] = b"\x93NUMPY\x01\x00\x3e\x00{'descr':'|u1', 'fortran_order':False, 'shape':(1,1,1,2)}    \nab";
 

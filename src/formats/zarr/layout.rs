@@ -1,9 +1,9 @@
 //! The files of a Zarr store, and the names of its types.
 
-use crate::base::description::NumberType;
-use crate::base::npy::numpy_name;
-use crate::base::stored::StoredType;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::description::NumberType;
+use wavesplat_core::base::npy::numpy_name;
+use wavesplat_core::base::stored::StoredType;
 
 /// The metadata of a group, of an array and of its attributes in version 2.
 pub(super) const GROUP: &str = ".zgroup";

@@ -1,17 +1,17 @@
 //! Zarr stores of versions 2 and 3 as [`ArrayFile`].
 
 use super::layout::{DIMENSIONS, metadata_file};
-use crate::base::description::{self, NumberType};
-use crate::base::error::{Error, Result};
-use crate::base::stored::StoredType;
-use crate::formats::arrays::describe::numbers;
-use crate::formats::arrays::opener::ReadConfig;
-use crate::formats::arrays::{ArrayArchive, ArrayFile, Attribute, Attributes, Variable};
-use crate::source::{OpenOptions, Parsed};
+use crate::arrays::describe::numbers;
+use crate::arrays::opener::ReadConfig;
+use crate::arrays::{ArrayArchive, ArrayFile, Attribute, Attributes, Variable};
 use serde_json::Value;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use wavesplat_core::base::description::{self, NumberType};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::{OpenOptions, Parsed};
 use zarrs::array::{Array, ArrayBytes, ArrayMetadata, ArrayShardedExt, ArraySubset, DataType, data_type};
 use zarrs::filesystem::FilesystemStore;
 use zarrs::group::Group;

@@ -2,12 +2,12 @@
 //! first; each chunk of samples is one zstd frame, of some items of the slowest axes.
 
 use super::layout::{ARRAY, ATTRIBUTES, DIMENSIONS, GROUP, dtype};
-use crate::base::description::{Attribute, NumberType, Numbers, Values};
-use crate::base::sample::{SampleType, store};
-use crate::formats::contents::Contents;
-use crate::formats::shared::dataset::{Dataset, DatasetVariable, number_type};
+use crate::contents::Contents;
+use crate::shared::dataset::{Dataset, DatasetVariable, number_type};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::description::{Attribute, NumberType, Numbers, Values};
+use wavesplat_core::base::sample::{SampleType, store};
 
 /// Bytes of a chunk before compression, unless one row is longer.
 const CHUNK: u64 = 8 << 20;
@@ -217,7 +217,7 @@ fn numbers_json(numbers: &Numbers) -> Option<Vec<Value>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::contents::testing::contents;
+    use crate::contents::testing::contents;
 
     #[test]
     fn chunks_are_consecutive_and_of_some_megabytes() {

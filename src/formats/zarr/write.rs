@@ -2,13 +2,13 @@
 
 use super::layout::{GROUP, METADATA};
 use super::store::{LEVEL, Store};
-use crate::base::error::{Error, Note, Remedy, Result};
-use crate::formats::contents::Contents;
-use crate::formats::encoding::Encoding;
-use crate::formats::writer::SampleSink;
+use crate::contents::Contents;
+use crate::encoding::Encoding;
+use crate::writer::SampleSink;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 
 /// A store that is being written.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use super::input::Input;
 use std::fmt::{Debug, Display};
 use std::str::FromStr;
 use wavesplat::base::grid::Grid;
-use wavesplat::cli::{Dims, FrameList, FrameRange, Pair, RegionSpec, Size, Triple, Whole};
+use wavesplat_cli::{Dims, FrameList, FrameRange, Pair, RegionSpec, Size, Triple, Whole};
 
 /// Parses text as every kind of value, for an archive of at most 999 frames and 256 voxels along an axis.
 pub fn values(data: &[u8]) {

@@ -8,9 +8,9 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use wavesplat::Error;
-use wavesplat::cli::Size;
-use wavesplat::cli::view::{self, Serving};
 use wavesplat::picture::{self, Caller, Inputs, PictureRequest, Session, ViewerSession};
+use wavesplat_cli::Size;
+use wavesplat_cli::view::{self, Serving};
 
 /// Makes the pictures of a request, given as JSON, from files. `memory` is a size such as 512MiB.
 #[pyfunction]

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::output::Output;
 use wavesplat::base::sample::SampleType;
-use wavesplat::cli::{self, spare_inputs};
+use wavesplat_cli::{self as cli, spare_inputs};
 
 // Each paragraph is one line, which is broken to fit the terminal.
 const HELP: &str = "\

@@ -19,13 +19,13 @@ use wavesplat::base::grid::Region;
 use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::cli::{InputArgs, Numbers};
 use wavesplat::colour::{Distribution, TransferFunction};
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, Mode, OverviewRequest, RenderConfig, Scene, SplatSource, Thinning};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
+use wavesplat_cli::{InputArgs, Numbers};
 
 /// The default archives.
 pub const USUAL: [&str; 2] = ["demo", "smooth"];

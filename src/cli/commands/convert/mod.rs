@@ -4,21 +4,21 @@ mod given;
 mod options;
 
 use super::several;
-use crate::base::error::{Error, Note, Result};
-use crate::base::output::{Output, STANDARD};
-use crate::cli::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
-use crate::colour::TransferFunction;
-use crate::convert::{Bound, ConvertReport, Failure, run as convert};
-use crate::file::CoefficientFile;
-use crate::file::repack::{RepackReport, repack};
-use crate::file::resume::{self, IfUnfinished};
-use crate::formats::extensions;
-use crate::picture::colours_of_source;
-use crate::source::FrameSource;
+use crate::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
 use clap::{Arg, Args, Command};
 pub(crate) use options::ConvertArgs;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::output::{Output, STANDARD};
+use wavesplat_core::colour::TransferFunction;
+use wavesplat_core::source::FrameSource;
+use wavesplat_engine::convert::{Bound, ConvertReport, Failure, run as convert};
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::repack::{RepackReport, repack};
+use wavesplat_engine::file::resume::{self, IfUnfinished};
+use wavesplat_formats::extensions;
+use wavesplat_jobs::picture::colours_of_source;
 
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
     args.common.start()?;

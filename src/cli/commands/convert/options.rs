@@ -1,14 +1,14 @@
 //! The options of `wavesplat convert`, and the request that they make.
 
 use super::given::GivenOptions;
-use crate::base::error::{Error, Result};
-use crate::cli::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
-use crate::convert::shard::Shard;
-use crate::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
-use crate::formats::extensions;
-use crate::picture::open_colours;
+use crate::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
 use clap::{Arg, Args, ValueEnum};
 use std::path::PathBuf;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_engine::convert::shard::Shard;
+use wavesplat_engine::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
+use wavesplat_formats::extensions;
+use wavesplat_jobs::picture::open_colours;
 
 /// Convert frames to a coefficient file
 #[derive(Debug, Clone, Args)]

@@ -1,15 +1,15 @@
 //! Describes an archive of frames.
 
 use super::InfoArgs;
-use crate::base::error::{Error, Result};
-use crate::base::output::STANDARD;
-use crate::cli::{note_text, print};
-use crate::convert::estimate::{Estimate, estimates};
-use crate::convert::{ConvertConfig, MissingPolicy};
-use crate::source::Archive;
+use crate::{note_text, print};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::source::Archive;
+use wavesplat_engine::convert::estimate::{Estimate, estimates};
+use wavesplat_engine::convert::{ConvertConfig, MissingPolicy};
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]

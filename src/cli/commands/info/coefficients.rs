@@ -1,17 +1,17 @@
 //! Describes a coefficient file.
 
 use super::{description, made_by};
-use crate::base::description::Description;
-use crate::base::error::Result;
-use crate::cli::{CommonArgs, print};
-use crate::convert::{Bound, Packing};
-use crate::file::promise::range_of_shares;
-use crate::file::report::{BoundReport, WindowReport, largest_bound};
-use crate::file::{CoefficientFile, time_labels};
-use crate::source::CHANNELS;
+use crate::{CommonArgs, print};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use wavesplat_core::base::description::Description;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::source::CHANNELS;
+use wavesplat_engine::convert::{Bound, Packing};
+use wavesplat_engine::file::promise::range_of_shares;
+use wavesplat_engine::file::report::{BoundReport, WindowReport, largest_bound};
+use wavesplat_engine::file::{CoefficientFile, time_labels};
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]

@@ -1,8 +1,8 @@
 //! Describes the metadata of the source that a file keeps.
 
-use crate::base::description::{Attribute, Description, NIFTI_HEADER, Values, Variable, coordinates};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
+use wavesplat_core::base::description::{Attribute, Description, NIFTI_HEADER, Values, Variable, coordinates};
 
 /// Attributes that are listed without `--verbose`.
 const MOST_ATTRIBUTES: usize = 6;
@@ -30,7 +30,7 @@ pub(super) fn text(description: &Description, verbose: bool) -> String {
 
 /// The axes of the source's array, slowest first.
 fn axes(description: &Description) -> String {
-    let axis = |axis: &crate::base::description::ArrayAxis| {
+    let axis = |axis: &wavesplat_core::base::description::ArrayAxis| {
         let dimension = &description.dimensions[axis.dimension as usize];
         let name = if dimension.name.is_empty() { "axis" } else { &dimension.name };
         let unlimited = if dimension.unlimited { " (unlimited)" } else { "" };

@@ -1,11 +1,11 @@
 //! The options that make a file again.
 
-use crate::cli::commands::convert::ConvertArgs;
-use crate::convert::Bound;
-use crate::file::promise::max_error;
-use crate::file::{CoefficientFile, setting};
+use crate::commands::convert::ConvertArgs;
 use clap::{Args, Command};
 use std::collections::BTreeMap;
+use wavesplat_engine::convert::Bound;
+use wavesplat_engine::file::promise::max_error;
+use wavesplat_engine::file::{CoefficientFile, setting};
 
 /// The options of `wavesplat convert` that make the same file from the same samples, with their values, including
 /// defaults. Colours given as a file of points are left out, because no option value names them.

@@ -6,11 +6,11 @@ mod description;
 mod made_by;
 mod variables;
 
-use crate::base::error::{Error, Result};
-use crate::cli::{CommonArgs, InputArgs, RemoteArgs, SelectArgs, share};
-use crate::file::CoefficientFile;
+use crate::{CommonArgs, InputArgs, RemoteArgs, SelectArgs, share};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_engine::file::CoefficientFile;
 
 /// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
 #[derive(Debug, Args)]

@@ -1,9 +1,9 @@
 //! Lists the variables of an archive from which the user must choose one.
 
-use crate::base::error::Result;
-use crate::cli::{CommonArgs, print};
-use crate::source::VariableInfo;
+use crate::{CommonArgs, print};
 use serde::Serialize;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::source::VariableInfo;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]

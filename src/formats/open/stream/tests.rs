@@ -1,9 +1,9 @@
 //! Tests of streams.
 
 use super::*;
-use crate::base::sample::SampleType;
-use crate::formats::open_stream;
-use crate::formats::testing::{DIMS, check_source, check_window, message, payload};
+use crate::open_stream;
+use crate::testing::{DIMS, check_source, check_window, message, payload};
+use wavesplat_core::base::sample::SampleType;
 
 const TY: SampleType = SampleType::F32;
 

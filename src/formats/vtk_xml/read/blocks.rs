@@ -1,7 +1,7 @@
 //! Arrays in blocks that are compressed by zlib one by one.
 
 use super::count::Count;
-use crate::formats::shared::words::wrong;
+use crate::shared::words::wrong;
 use flate2::bufread::ZlibDecoder;
 use std::io::{self, BufReader, Read, Take};
 

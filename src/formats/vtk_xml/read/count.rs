@@ -1,6 +1,6 @@
 //! The numbers that VTK writes before the samples of an array.
 
-use crate::formats::shared::words::wrong;
+use crate::shared::words::wrong;
 use std::io::{self, ErrorKind, Read};
 
 /// A count that VTK puts before the samples of an array.

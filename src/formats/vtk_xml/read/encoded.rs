@@ -2,15 +2,15 @@
 
 use super::blocks::Blocks;
 use super::count::Count;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::stored::StoredType;
-use crate::formats::shared::base64::Text;
-use crate::formats::shared::deflated::FileReader;
-use crate::formats::shared::pieces::Packed;
-use crate::formats::shared::text::{Characters, Numbers};
-use crate::formats::shared::words::wrong;
+use crate::shared::base64::Text;
+use crate::shared::deflated::FileReader;
+use crate::shared::pieces::Packed;
+use crate::shared::text::{Characters, Numbers};
+use crate::shared::words::wrong;
 use std::io::{self, Read};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
 
 /// How bytes are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub(super) struct EncodedArray {
 
 impl EncodedArray {
     /// Where its samples are, if they are stored raw.
-    pub(super) fn plain(&self) -> Option<u64> {
+    pub(crate) fn plain(&self) -> Option<u64> {
         let plain = self.form == Form::Raw && !self.compressed;
         plain.then(|| self.start + self.count.size() as u64)
     }

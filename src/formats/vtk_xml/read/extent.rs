@@ -1,6 +1,6 @@
 //! Boxes of a lattice by their first and last points, and whether boxes cover a larger one.
 
-use crate::source::Parsed;
+use wavesplat_core::source::Parsed;
 
 /// First and last point along x, y, z.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

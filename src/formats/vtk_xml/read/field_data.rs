@@ -2,11 +2,11 @@
 
 use super::header::VtiArray;
 use super::image::VtiFile;
-use crate::base::description::{Description, Dimension, Numbers, Values, Variable};
-use crate::base::mapped::{Access, FileBytes};
-use crate::formats::shared::pieces::Packed;
-use crate::formats::vtk_xml::layout::TYPES;
+use crate::shared::pieces::Packed;
+use crate::vtk_xml::layout::TYPES;
 use std::io::Read;
+use wavesplat_core::base::description::{Description, Dimension, Numbers, Values, Variable};
+use wavesplat_core::base::mapped::{Access, FileBytes};
 
 /// Bytes of an array that is kept.
 const MOST_BYTES: usize = 1 << 20;

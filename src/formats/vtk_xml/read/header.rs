@@ -1,13 +1,13 @@
 //! The XML of a `.vti`, a `.vtr`, or a list of such pieces.
 
 use super::extent::Extent;
-use crate::formats::shared::association::Association;
-use crate::formats::shared::words::array;
-use crate::formats::shared::xml::{attribute, required};
-use crate::formats::vtk_xml::layout::TIME;
-use crate::source::Parsed;
+use crate::shared::association::Association;
+use crate::shared::words::array;
+use crate::shared::xml::{attribute, required};
+use crate::vtk_xml::layout::TIME;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
+use wavesplat_core::source::Parsed;
 
 /// One `<DataArray>`, as it is written.
 #[derive(Debug)]

@@ -4,14 +4,14 @@ use super::count::Count;
 use super::encoded::{EncodedArray, Form};
 use super::header::{self, VtiArray, VtiHeader};
 use super::skeleton::Skeleton;
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::sample;
-use crate::base::stored::StoredType;
-use crate::formats::shared::pieces::Packed;
-use crate::formats::vtk_xml::layout::TYPES;
+use crate::shared::pieces::Packed;
+use crate::vtk_xml::layout::TYPES;
 use std::io::Read;
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::sample;
+use wavesplat_core::base::stored::StoredType;
 
 /// A file, and its XML.
 pub(super) struct VtiFile {

@@ -13,20 +13,20 @@ mod rectilinear;
 mod skeleton;
 
 use super::layout::{IMAGE_DATA, TYPES};
-use crate::base::description::Description;
-use crate::base::error::{Error, Note, Result};
-use crate::base::stored::StoredType;
-use crate::formats::shared::component::{self, Chosen};
-use crate::formats::shared::directions::{Directions, Placed};
-use crate::source::file_header::FileHeader;
-use crate::source::layout::Shape;
-use crate::source::layout::{Axis, Layout};
-use crate::source::parts::Stored;
-use crate::source::{Advised, Parsed, VariableInfo};
+use crate::shared::component::{self, Chosen};
+use crate::shared::directions::{Directions, Placed};
 use extent::Extent;
 use header::{VtiArray, VtiHeader};
 use image::VtiFile;
 use std::path::Path;
+use wavesplat_core::base::description::Description;
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::stored::StoredType;
+use wavesplat_core::source::file_header::FileHeader;
+use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::parts::Stored;
+use wavesplat_core::source::{Advised, Parsed, VariableInfo};
 
 /// Reads the XML of one file and of the files that it lists, and checks that the array is complete.
 pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {

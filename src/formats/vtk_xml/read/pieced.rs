@@ -5,11 +5,11 @@ use super::encoded::EncodedArray;
 use super::extent::{Extent, check_pieces};
 use super::header::{VtiArray, VtiPiece};
 use super::image::VtiFile;
-use crate::base::error::{Error, Result};
-use crate::formats::shared::pieces::{self, Pieces};
-use crate::source::layout::Layout;
-use crate::source::parts::{DataLocation, Part};
+use crate::shared::pieces::{self, Pieces};
 use std::path::Path;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::parts::{DataLocation, Part};
 
 const MOST: usize = 1 << 14; // pieces: each is compared with every other one
 

@@ -3,18 +3,18 @@
 use super::extent::Extent;
 use super::header::{VtiArray, VtiPiece};
 use super::image::VtiFile;
-use crate::base::description::{Description, Values, Variable};
-use crate::base::error::{Error, Result};
-use crate::base::mapped::{Access, FileBytes};
-use crate::base::sample;
-use crate::formats::shared::association::Association;
-use crate::formats::shared::directions::Directions;
-use crate::formats::shared::pieces::Packed;
-use crate::formats::vtk_xml::layout::{RECTILINEAR_GRID, TYPES};
-use crate::source::Parsed;
-use crate::source::layout::Layout;
+use crate::shared::association::Association;
+use crate::shared::directions::Directions;
+use crate::shared::pieces::Packed;
+use crate::vtk_xml::layout::{RECTILINEAR_GRID, TYPES};
 use std::io::Read;
 use std::path::Path;
+use wavesplat_core::base::description::{Description, Values, Variable};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::sample;
+use wavesplat_core::source::Parsed;
+use wavesplat_core::source::layout::Layout;
 
 /// Points along an axis.
 const MOST: usize = 1 << 24;
@@ -175,9 +175,9 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::open;
-    use crate::formats::testing::{Folder, refused, survives_damage};
-    use crate::source::OpenOptions;
+    use crate::open;
+    use crate::testing::{Folder, refused, survives_damage};
+    use wavesplat_core::source::OpenOptions;
 
     /// A grid of 3 x 2 x 1 points as text.
     fn grid(coordinates: &[&str]) -> String {

@@ -1,7 +1,7 @@
 //! The XML of a file without the samples that are stored in it as text, which may not fit in memory.
 
-use crate::base::error::{Error, Result};
-use crate::base::mapped::FileBytes;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::mapped::FileBytes;
 
 const PIECE: usize = 64 << 10; // bytes read at a time
 const KEPT: usize = 64; // bytes of a text that stay
@@ -103,8 +103,8 @@ impl Skeleton {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::mapped::Access;
-    use crate::formats::testing::Folder;
+    use crate::testing::Folder;
+    use wavesplat_core::base::mapped::Access;
 
     #[test]
     fn long_texts_are_left_out_and_places_are_those_of_the_file() {
@@ -143,6 +143,6 @@ mod tests {
         }
         assert_eq!(skeleton.end(), bytes.len() as u64);
         let cuts = format!("<a>{}", "-1 -".repeat(20) + &"- ".repeat(MOST_CUTS + PIECE));
-        assert!(crate::formats::testing::message(read(&cuts)).contains("does not end"));
+        assert!(crate::testing::message(read(&cuts)).contains("does not end"));
     }
 }

@@ -3,14 +3,14 @@
 mod pieced;
 
 use super::count::Count;
-use crate::base::sample::SampleType;
-use crate::formats::open;
-use crate::formats::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value};
-use crate::source::OpenOptions;
+use crate::open;
+use crate::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value};
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
 use flate2::write::ZlibEncoder;
 use std::io::Write;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::OpenOptions;
 
 /// A file to be varied: its tag, its arrays, and what comes after the image.
 struct Vti {
@@ -241,7 +241,7 @@ fn straight_directions_are_turned() {
     let ty = SampleType::U16;
     let all: Vec<u8> = payload(ty, 0..1, false);
     let flipped = |[x, y, z]: [usize; 3]| all[2 * (((2 - z) * 5 + y) * 7 + (6 - x))..][..2].to_vec();
-    let voxels = crate::base::grid::Region { start: [0; 3], end: [7, 5, 3] };
+    let voxels = wavesplat_core::base::grid::Region { start: [0; 3], end: [7, 5, 3] };
     let samples: Vec<u8> = voxels.iter().flat_map(flipped).collect();
     let [before, blocks] = zlib(&samples, TAGS[0].1, 64);
     let packed = appended(&compressed(TAGS[0].0), "UInt16", "raw", &[before, blocks].concat());
@@ -255,7 +255,7 @@ fn straight_directions_are_turned() {
     }
     // Axes of 5, 3, 7 voxels that go along y, z, x.
     let order = |[y, z, x]: [usize; 3]| all[2 * ((z * 5 + y) * 7 + x)..][..2].to_vec();
-    let voxels = crate::base::grid::Region { start: [0; 3], end: [5, 3, 7] };
+    let voxels = wavesplat_core::base::grid::Region { start: [0; 3], end: [5, 3, 7] };
     let samples: Vec<u8> = voxels.iter().flat_map(order).collect();
     let bytes = directed(&raw(TAGS[0], "UInt16", &samples), "0 0 1 1 0 0 0 1 0");
     let at = bytes.windows(4).position(|w| w == b"\n  _").expect("appended");
@@ -339,7 +339,7 @@ fn damaged_blocks_are_errors() {
         let vti = appended(&compressed(TAGS[0].0), "UInt8", "raw", &[before, blocks].concat());
         let file = folder.write("a.vti", vti.bytes());
         let failed = open(&[file], &OpenOptions::default()).and_then(|mut source| source.window(0, 1).map(|_| ()));
-        let message = crate::formats::testing::message(failed);
+        let message = crate::testing::message(failed);
         assert!(message.contains(words), "{words:?} is not in {message:?}");
     };
     let counts = |counts: &[usize]| counts.iter().flat_map(|n| stored_count(*n, count)).collect::<Vec<_>>();
@@ -370,7 +370,7 @@ fn numbers_as_text_are_read() {
     for (text, words) in [("1 2 3", "end early"), ("1 x", "\"x\" is no number"), ("256", "\"256\" is no number")] {
         let file = folder.write("a.vti", inline(TAGS[0].0, "UInt8", "ascii", text).bytes());
         let mut source = open(&[file], &OpenOptions::default()).expect("opening");
-        let message = crate::formats::testing::message(source.window(0, 1));
+        let message = crate::testing::message(source.window(0, 1));
         assert!(message.contains(words), "{words:?} is not in {message:?}");
     }
 }
@@ -422,5 +422,5 @@ fn no_damage_of_compressed_arrays_panics() {
     let [before, blocks] = zlib(&[7; 105], TAGS[0].1, 64);
     let good = appended(&compressed(TAGS[0].0), "UInt8", "raw", &[before, blocks].concat()).bytes();
     let data = good.windows(5).position(|w| w == b"raw\">").expect("tag") + 5;
-    crate::formats::testing::survives_damage_in(data..good.len(), "a.vti", &good);
+    crate::testing::survives_damage_in(data..good.len(), "a.vti", &good);
 }

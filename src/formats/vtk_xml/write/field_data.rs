@@ -1,10 +1,10 @@
 //! VTK's field data: the time of a frame, and the arrays of a source of VTK that belong to no point or cell.
 
-use crate::base::description::{Description, NumberType, Numbers, Values, Variable};
-use crate::base::stored::StoredType;
-use crate::formats::contents::Contents;
-use crate::formats::vtk_xml::layout::{TIME, TYPES};
+use crate::contents::Contents;
+use crate::vtk_xml::layout::{TIME, TYPES};
 use quick_xml::escape::escape;
+use wavesplat_core::base::description::{Description, NumberType, Numbers, Values, Variable};
+use wavesplat_core::base::stored::StoredType;
 
 /// The elements in `<FieldData>`.
 pub(crate) fn text(contents: &Contents, time: f64) -> String {

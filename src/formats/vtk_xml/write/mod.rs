@@ -4,7 +4,7 @@ pub(super) mod field_data;
 pub(super) mod vti;
 pub(super) mod vtr;
 
-use crate::formats::contents::Contents;
+use crate::contents::Contents;
 use quick_xml::escape::escape;
 
 /// The text after the samples.

@@ -1,9 +1,9 @@
 //! The text before the samples of a `.vti`.
 
 use super::{field_data, units};
-use crate::formats::contents::{Contents, Lattice};
-use crate::formats::vtk_xml::layout::TYPES;
-use crate::formats::writer::Samples;
+use crate::contents::{Contents, Lattice};
+use crate::vtk_xml::layout::TYPES;
+use crate::writer::Samples;
 use quick_xml::escape::escape;
 use std::io::{self, Write};
 
@@ -53,8 +53,8 @@ fn direction(lattice: &Lattice) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::sample::SampleType;
-    use crate::formats::contents::testing::contents;
+    use crate::contents::testing::contents;
+    use wavesplat_core::base::sample::SampleType;
 
     #[test]
     fn names_and_units_are_escaped() {

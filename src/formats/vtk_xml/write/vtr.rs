@@ -1,9 +1,9 @@
 //! The text and the coordinates before the samples of a `.vtr`: a VTK rectilinear grid.
 
 use super::{field_data, units};
-use crate::formats::contents::Contents;
-use crate::formats::vtk_xml::layout::TYPES;
-use crate::formats::writer::Samples;
+use crate::contents::Contents;
+use crate::vtk_xml::layout::TYPES;
+use crate::writer::Samples;
 use quick_xml::escape::escape;
 use std::io::{self, Write};
 

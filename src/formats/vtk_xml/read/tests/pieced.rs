@@ -5,7 +5,7 @@ use super::*;
 /// The samples of a box of frame 0.
 fn part(ty: SampleType, from: [usize; 3], to: [usize; 3]) -> Vec<u8> {
     let all = payload(ty, 0..1, false);
-    let voxels = crate::base::grid::Region { start: from, end: to };
+    let voxels = wavesplat_core::base::grid::Region { start: from, end: to };
     voxels.iter().flat_map(|[x, y, z]| all[((z * 5 + y) * 7 + x) * ty.size()..][..ty.size()].to_vec()).collect()
 }
 

@@ -1,0 +1,34 @@
+//! The parts that all other folders use: errors, progress, samples, grids, mapped files and output files.
+//!
+//! Nothing here depends on frames, coefficients or pictures. A module uses only those listed above it.
+
+mod remedy;
+pub mod error;
+pub mod progress;
+pub mod cancel;
+pub mod choice;
+pub mod report;
+pub mod memory;
+pub mod vectors;
+pub mod zeroed;
+#[doc(hidden)]
+pub mod text;
+pub mod spread;
+pub(crate) mod half;
+mod calendar;
+pub(crate) mod clock;
+pub mod decimal;
+pub mod address;
+#[doc(hidden)]
+pub mod time_labels;
+pub mod sample;
+pub mod stored;
+pub mod grid;
+pub mod values;
+pub mod description;
+pub mod mapped;
+#[doc(hidden)]
+pub mod output;
+pub mod inputs;
+#[doc(hidden)]
+pub mod npy;

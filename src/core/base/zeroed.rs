@@ -1,0 +1,78 @@
+//! Large buffers of zeros. They lie in huge pages where the system offers them: fresh memory in small pages costs as
+//! much as the work done in it.
+
+use bytemuck::Pod;
+use memmap2::MmapMut;
+use std::fmt;
+use std::ops::{Deref, DerefMut};
+
+/// A buffer of numbers, zero at first.
+pub enum Zeroed<T> {
+    /// Small.
+    Heap(Vec<T>),
+    /// The map and the length in numbers. Pages that are never written take no memory.
+    Map(MmapMut, usize),
+}
+
+/// Smaller buffers come from the heap.
+const LARGE: usize = 4 << 20;
+
+impl<T: Pod> Zeroed<T> {
+    /// A buffer of `len` zeros.
+    pub fn new(len: usize) -> Self {
+        let bytes = len * size_of::<T>();
+        let map = if bytes >= LARGE { MmapMut::map_anon(bytes).ok() } else { None };
+        let Some(map) = map else { return Self::Heap(vec![T::zeroed(); len]) };
+        #[cfg(target_os = "linux")]
+        let _ = map.advise(memmap2::Advice::HugePage); // advice only: a system without huge pages is slower
+        Self::Map(map, len)
+    }
+}
+
+impl<T> Default for Zeroed<T> {
+    fn default() -> Self {
+        Self::Heap(Vec::new())
+    }
+}
+
+impl<T: Pod> Deref for Zeroed<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        match self {
+            Self::Heap(numbers) => numbers,
+            Self::Map(map, len) => &bytemuck::cast_slice(&map[..len * size_of::<T>()])[..*len],
+        }
+    }
+}
+
+impl<T: Pod> DerefMut for Zeroed<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        match self {
+            Self::Heap(numbers) => numbers,
+            Self::Map(map, len) => &mut bytemuck::cast_slice_mut(&mut map[..*len * size_of::<T>()])[..*len],
+        }
+    }
+}
+
+impl<T: Pod> fmt::Debug for Zeroed<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} numbers", self.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_and_large_buffers_hold_zeros_until_written() {
+        for len in [0, 5, LARGE / 4 - 1, LARGE / 4, LARGE] {
+            let mut buffer = Zeroed::<f32>::new(len);
+            assert!(buffer.len() == len && buffer.iter().all(|n| *n == 0.0));
+            let numbers = || (0..len).map(|n| (n % 1000) as f32);
+            buffer.iter_mut().zip(numbers()).for_each(|(to, n)| *to = n);
+            assert!(buffer.iter().copied().eq(numbers()));
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! Large buffers that are reused: fresh memory from the system costs about as much as decoding a block into it.
+
+use std::ops::{Deref, DerefMut};
+use std::sync::{Mutex, PoisonError};
+
+/// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. So the pool never
+/// holds more memory than buffers of its sizes had at one time. Only blocks use buffers, so none is much larger than others
+/// of its kind.
+#[derive(Debug, Default)]
+pub struct Buffer<T: Pooled> {
+    /// At least `len` values; the rest has been used before.
+    values: Vec<T>,
+    len: usize,
+}
+
+impl<T: Pooled> Buffer<T> {
+    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough, or a new one.
+    pub fn with_len(len: usize) -> Self {
+        let mut spare = spare::<T>();
+        let fits = (0..spare.len()).filter(|n| spare[*n].len() >= len).min_by_key(|n| spare[*n].len());
+        let values = fits.map(|n| spare.swap_remove(n));
+        drop(spare);
+        Self { values: values.unwrap_or_else(|| vec![T::default(); len]), len }
+    }
+}
+
+impl<T: Pooled> FromIterator<T> for Buffer<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
+        let values: Vec<T> = values.into_iter().collect();
+        Self { len: values.len(), values }
+    }
+}
+
+impl<T: Pooled> Drop for Buffer<T> {
+    fn drop(&mut self) {
+        if !self.values.is_empty() {
+            spare::<T>().push(std::mem::take(&mut self.values));
+        }
+    }
+}
+
+impl<T: Pooled> Deref for Buffer<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.values[..self.len]
+    }
+}
+
+impl<T: Pooled> DerefMut for Buffer<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.values[..self.len]
+    }
+}
+
+fn spare<T: Pooled>() -> std::sync::MutexGuard<'static, Vec<Vec<T>>> {
+    T::spare().lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Empties a buffer and keeps its memory.
+pub(super) fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
+    buffer.clear();
+    buffer
+}
+
+/// A type that buffers can hold.
+pub trait Pooled: Copy + Default + 'static {
+    /// The unused buffers.
+    fn spare() -> &'static Mutex<Vec<Vec<Self>>>;
+}
+
+/// Returns the memory of all unused buffers to the system.
+pub fn release_spare() {
+    fn release<T: Pooled>() {
+        *spare::<T>() = Vec::new();
+    }
+    release::<u8>();
+    release::<i32>();
+    release::<f32>();
+    release::<f64>();
+}
+
+macro_rules! pooled {
+    ($($t:ty),*) => {
+        $(impl Pooled for $t {
+            fn spare() -> &'static Mutex<Vec<Vec<Self>>> {
+                static SPARE: Mutex<Vec<Vec<$t>>> = Mutex::new(Vec::new());
+                &SPARE
+            }
+        })*
+    };
+}
+
+pooled!(u8, i32, f32, f64);
+#[cfg(test)]
+pooled!(u64);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_used_again_and_grows() {
+        let address = |buffer: &Buffer<u64>| buffer.as_ptr();
+        let (small, large) = (Buffer::with_len(1 << 8), Buffer::with_len(1 << 12));
+        let memory = [address(&small), address(&large)];
+        drop((small, large));
+        let again = Buffer::with_len(1 << 10);
+        assert_eq!((address(&again), again.len()), (memory[1], 1 << 10));
+        let small = Buffer::with_len(3);
+        assert_eq!((address(&small), small.len()), (memory[0], 3));
+        assert_eq!(Buffer::<u64>::with_len(1 << 14).len(), 1 << 14);
+    }
+}

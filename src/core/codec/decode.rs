@@ -1,0 +1,352 @@
+//! Decodes a block to samples: the only decoder of the project.
+//!
+//! A coefficient is its code times the step, refined by the pyramid if there is one (eq 32). The inverse transform of
+//! each voxel's coefficients gives its series (eq 7). Then outliers and missing samples, stored exactly, replace
+//! decoded samples.
+
+use super::WindowCodec;
+use super::buffer::Buffer;
+use super::codes::Codes;
+use super::field::{Field, Plane};
+use super::rows::Change;
+use crate::base::sample::{self, SampleType};
+use std::collections::HashMap;
+use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
+
+/// One block in memory, decompressed but not yet transformed.
+#[derive(Debug)]
+pub struct Block {
+    /// The number of decoded voxels along x, y, z.
+    pub size: [usize; 3],
+    /// The number of decoded voxels.
+    pub voxels: usize,
+    /// All voxels of the block; more than are decoded if the codec leaves out detail.
+    of: [usize; 3],
+    /// The quantisation step.
+    pub step: f64,
+    /// The codes of the level parts that were read.
+    pub codes: Codes,
+    /// Samples stored exactly because their decoded values miss the bound.
+    pub outliers: Outliers,
+    /// Which samples are missing (`frame * voxels + voxel`), and the bytes of those in order; empty if none is missing.
+    pub missing: (Vec<bool>, Vec<u8>),
+    /// All samples, if the block is stored exactly.
+    pub exact: Option<Vec<u8>>,
+    /// The number of stored bytes read.
+    pub bytes_read: u64,
+}
+
+impl Block {
+    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples.
+    pub fn read<S: Storage>(
+        reader: &Reader<S>,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        of: [usize; 3],
+        wanted: &[bool],
+    ) -> Result<Self> {
+        let size = codec.decoded_size(of);
+        let mut block = Self {
+            size,
+            voxels: size.iter().product(),
+            of,
+            step: entry.stats.step,
+            codes: Codes::default(),
+            outliers: reader.outliers(entry)?,
+            missing: reader.missing(entry)?.unwrap_or_default(),
+            exact: reader.exact(entry)?,
+            bytes_read: 0,
+        };
+        block.thin_samples(codec);
+        block.read_codes(reader, codec, entry, wanted)?;
+        block.bytes_read += entry.parts.iter().filter(|p| !is_level(p)).map(|p| u64::from(p.stored_len)).sum::<u64>();
+        Ok(block)
+    }
+
+    /// The parts that [`Self::read`] reads.
+    pub fn parts<'a>(
+        codec: &'a WindowCodec,
+        entry: &'a BlockEntry,
+        wanted: &'a [bool],
+    ) -> impl Iterator<Item = &'a PartEntry> {
+        entry.parts.iter().filter(|part| match part.kind {
+            PartKind::Level(level) => codec.needs_part(level.into(), wanted),
+            _ => true,
+        })
+    }
+
+    /// A block with these codes, as [`Self::all_codes`] returns them.
+    pub fn from_codes(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &[i32]) -> Self {
+        let mut block = Self { missing: Default::default(), step, ..Self::missing(codec, size) };
+        block.set_codes(codec, codes);
+        block
+    }
+
+    /// A block with every sample missing: NaN for float types, else the declared value, or 0 without one.
+    pub fn missing(codec: &WindowCodec, of: [usize; 3]) -> Self {
+        let size = codec.decoded_size(of);
+        let voxels: usize = size.iter().product();
+        let samples = codec.frames() * voxels;
+        let number = if codec.sample.is_float() { f64::NAN } else { codec.missing_value.unwrap_or(0.0) };
+        let mut bytes = vec![0; samples * codec.sample.size()];
+        sample::store(codec.sample, &vec![number; samples], &mut bytes);
+        let (outliers, missing) = (Outliers::default(), (vec![true; samples], bytes));
+        Self { size, voxels, of, step: 0.0, codes: Codes::default(), outliers, missing, exact: None, bytes_read: 0 }
+    }
+
+    /// Reads the level parts that exist and that `wanted` needs; the codes of others are zero.
+    fn read_codes<S: Storage>(
+        &mut self,
+        reader: &Reader<S>,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+    ) -> Result<()> {
+        let parts: Vec<&PartEntry> = Self::parts(codec, entry, wanted).filter(|part| is_level(part)).collect();
+        if parts.is_empty() {
+            return Ok(());
+        }
+        self.bytes_read += parts.iter().map(|part| u64::from(part.stored_len)).sum::<u64>();
+        let needed = |level: u8| parts.iter().any(|part| part.kind == PartKind::Level(level));
+        self.codes = match &codec.scheme.pyramid {
+            Some(pyramid) => {
+                let passes = codec.passes(pyramid, self.of);
+                Codes::Sparse(passes.read(reader, entry, needed)?)
+            }
+            None => Codes::Dense(self.read_dense(reader, codec, entry, needed)?),
+        };
+        Ok(())
+    }
+
+    fn read_dense<S: Storage>(
+        &self,
+        reader: &Reader<S>,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        needed: impl Fn(u8) -> bool,
+    ) -> Result<Buffer<i32>> {
+        let all: usize = self.of.iter().product();
+        let mut codes = Buffer::with_len(codec.basis.coefficients() * all);
+        for level in 0..codec.parts() as u8 {
+            let range = codec.level_range(level, self.of);
+            if needed(level) {
+                reader.codes(entry, level, &mut codes[range])?;
+            } else {
+                codes[range].fill(0);
+            }
+        }
+        if codec.lod == 0 {
+            return Ok(codes);
+        }
+        let decoded = self.decoded_voxels(codec);
+        Ok(codes.chunks_exact(all).flat_map(|of_k| decoded.iter().map(|voxel| of_k[*voxel])).collect())
+    }
+
+    /// The numbers of the voxels that are decoded, among all.
+    fn decoded_voxels(&self, codec: &WindowCodec) -> Vec<usize> {
+        let [x, y, _] = self.of;
+        let along = |a: usize| (0..self.of[a]).step_by(1 << codec.lod);
+        along(2).flat_map(|z| along(1).flat_map(move |y_| along(0).map(move |x_| x_ + x * (y_ + y * z)))).collect()
+    }
+
+    /// Leaves out the stored samples of voxels that are not decoded.
+    fn thin_samples(&mut self, codec: &WindowCodec) {
+        if codec.lod == 0 || (self.exact.is_none() && !self.overrides()) {
+            return;
+        }
+        let (all, size) = (self.of.iter().product::<usize>(), codec.sample.size());
+        let decoded = self.decoded_voxels(codec);
+        let samples = || (0..codec.frames()).flat_map(|frame| decoded.iter().map(move |voxel| frame * all + voxel));
+        if let Some(exact) = &mut self.exact {
+            *exact = samples().flat_map(|at| exact[at * size..(at + 1) * size].to_vec()).collect();
+        }
+        let stored = |positions: &mut dyn Iterator<Item = usize>, bytes: &[u8]| -> HashMap<usize, Vec<u8>> {
+            positions.zip(bytes.chunks_exact(size).map(<[u8]>::to_vec)).collect()
+        };
+        let Outliers { positions, samples: bytes } = std::mem::take(&mut self.outliers);
+        let outliers = stored(&mut positions.iter().map(|at| *at as usize), &bytes);
+        let (mask, bytes) = std::mem::take(&mut self.missing);
+        let missing = stored(&mut (0..mask.len()).filter(|at| mask[*at]), &bytes);
+        for (number, at) in samples().enumerate() {
+            if let Some(bytes) = outliers.get(&at) {
+                self.outliers.positions.push(number as u32);
+                self.outliers.samples.extend(bytes);
+            }
+            if !mask.is_empty() {
+                self.missing.0.push(mask[at]);
+                self.missing.1.extend(missing.get(&at).into_iter().flatten());
+            }
+        }
+        if !self.missing.0.contains(&true) {
+            self.missing.0.clear();
+        }
+    }
+
+    /// All codes, including zeros: `codes[k * voxels + voxel]`, or with a pyramid pass after pass. Empty if no code is held.
+    pub fn all_codes(&self, codec: &WindowCodec) -> Vec<i32> {
+        match (&codec.scheme.pyramid, &self.codes) {
+            (Some(pyramid), Codes::Sparse(codes)) => codec.passes(pyramid, self.of).dense(codes),
+            _ => self.codes.dense().to_vec(),
+        }
+    }
+
+    /// Replaces the codes; `codes` are all of them, as [`Self::all_codes`] returns them.
+    pub fn set_codes(&mut self, codec: &WindowCodec, codes: &[i32]) {
+        self.codes = match &codec.scheme.pyramid {
+            Some(pyramid) => Codes::Sparse(codec.passes(pyramid, self.of).list(codes)),
+            None => Codes::Dense(codes.iter().copied().collect()),
+        };
+    }
+
+    /// Decodes the codes to coefficients.
+    pub fn field(&self, codec: &WindowCodec) -> Field<'_> {
+        Field::decode(codec, self.of, self.step, &self.codes)
+    }
+
+    /// Decodes every k that `wanted` marks of a pyramid, if that is needed at once: because one k cannot be decoded
+    /// without others, or because some samples are overridden.
+    pub fn field_at_once(&self, codec: &WindowCodec, wanted: &[bool]) -> Option<Field<'static>> {
+        let pyramid = codec.scheme.pyramid.as_ref()?;
+        let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
+        at_once.then(|| Field::refined(codec, self.of, self.step, self.codes.sparse(), wanted))
+    }
+
+    /// Bytes of memory that the block takes.
+    pub fn held_bytes(&self) -> usize {
+        let overrides = self.missing.0.len() + self.missing.1.len() + self.outliers.samples.len();
+        let exact = self.exact.as_ref().map_or(0, Vec::len);
+        self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact
+    }
+
+    /// Whether any sample is stored exactly, and overrides the coefficients.
+    pub fn overrides(&self) -> bool {
+        !(self.outliers.positions.is_empty() && self.missing.0.is_empty())
+    }
+
+    /// Decodes the codes of one k, into one of the two vectors.
+    pub fn plane<'a>(
+        &'a self,
+        codec: &WindowCodec,
+        k: usize,
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
+    ) -> Plane<'a> {
+        Plane::decode(codec, self.of, self.step, &self.codes, k, single, double)
+    }
+
+    /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the
+    /// largest change from leaving out this part and all finer ones.
+    pub fn largest(&self, codec: &WindowCodec) -> Vec<f64> {
+        let Some(pyramid) = &codec.scheme.pyramid else {
+            let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
+            let of_level = |level| self.codes.dense().get(codec.level_range(level, self.of)).map_or(0.0, of_codes);
+            return (0..codec.parts() as u8).map(of_level).collect();
+        };
+        let passes = codec.passes(pyramid, self.of);
+        self.field(codec).changes(&passes, self.step, self.codes.sparse()).iter().map(Change::largest).collect()
+    }
+
+    /// Whether a sample is missing.
+    pub fn is_missing(&self, index: usize) -> bool {
+        self.missing.0.get(index).copied().unwrap_or(false)
+    }
+
+    /// Calls `visit(index of the first, values)` for all samples decoded from coefficients, a run of voxels at a time.
+    /// Outliers and missing samples are not yet in place.
+    pub fn for_each_run(&self, codec: &WindowCodec, visit: impl FnMut(usize, &[f64])) {
+        let field = self.field(codec);
+        if codec.scheme.basis == Basis::Samples {
+            field.for_each_run_of_samples(codec.frames() * self.voxels, visit);
+        } else {
+            field.for_each_run(codec.basis.as_ref(), self.voxels, visit);
+        }
+    }
+
+    /// The series of one voxel, decoded from the coefficients.
+    pub fn series(&self, codec: &WindowCodec, field: &Field<'_>, voxel: usize) -> Vec<f64> {
+        field.series(codec.basis.as_ref(), self.voxels, voxel)
+    }
+
+    /// All samples of the block in their own type, little-endian, `frame * voxels + voxel`.
+    pub fn samples(&self, codec: &WindowCodec) -> Buffer<u8> {
+        if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
+            let field = self.field(codec);
+            if let Some(values) = field.singles() {
+                return self.stored_singles(codec, values);
+            }
+        }
+        self.decode(codec, |_, _| {})
+    }
+
+    /// Samples in the case that nodes are samples and already have the sample type.
+    fn stored_singles(&self, codec: &WindowCodec, values: &[f32]) -> Buffer<u8> {
+        let mut out = Buffer::with_len(4 * values.len());
+        for (bytes, value) in out.as_chunks_mut().0.iter_mut().zip(values) {
+            *bytes = value.to_le_bytes();
+        }
+        clip(codec, &mut out);
+        self.put_overrides(4, &mut out);
+        out
+    }
+
+    /// As [`Self::samples`], with the values that are splatted, which are not rounded to the sample type.
+    pub fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
+        let mut values = Buffer::with_len(codec.frames() * self.voxels);
+        let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
+        if self.exact.is_some() {
+            sample::load(codec.sample, &samples, &mut values);
+        }
+        let outliers = self.outliers.samples.chunks_exact(codec.sample.size());
+        for (index, bytes) in self.outliers.positions.iter().map(|p| *p as usize).zip(outliers) {
+            sample::load(codec.sample, bytes, &mut values[index..=index]);
+        }
+        (samples, values)
+    }
+
+    /// Decodes all samples; `visit(index of the first, values)` gets values before they are rounded.
+    fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Buffer<u8> {
+        let size = codec.sample.size();
+        let mut out = Buffer::with_len(codec.frames() * self.voxels * size);
+        match &self.exact {
+            Some(exact) => out.copy_from_slice(exact),
+            None => {
+                self.for_each_run(codec, |at, values| {
+                    visit(at, values);
+                    sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
+                });
+                clip(codec, &mut out);
+            }
+        }
+        self.put_overrides(size, &mut out);
+        out
+    }
+
+    /// Replaces samples by outliers and missing samples.
+    fn put_overrides(&self, size: usize, out: &mut [u8]) {
+        let outliers =
+            self.outliers.positions.iter().map(|p| *p as usize).zip(self.outliers.samples.chunks_exact(size));
+        let positions = self.missing.0.iter().enumerate().filter(|(_, missing)| **missing).map(|(i, _)| i);
+        for (index, bytes) in outliers.chain(positions.zip(self.missing.1.chunks_exact(size))) {
+            out[index * size..(index + 1) * size].copy_from_slice(bytes);
+        }
+    }
+}
+
+/// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
+fn clip(codec: &WindowCodec, samples: &mut [u8]) {
+    let (Some((lo, hi)), ty) = (codec.clip, codec.sample) else { return };
+    let mut values = vec![0.0; CLIPPED];
+    for run in samples.chunks_mut(CLIPPED * ty.size()) {
+        let values = &mut values[..run.len() / ty.size()];
+        sample::load(ty, run, values);
+        values.iter_mut().for_each(|value| *value = value.clamp(lo, hi));
+        sample::store(ty, values, run);
+    }
+}
+
+/// Samples that are clipped at a time.
+const CLIPPED: usize = 4 << 10;
+
+fn is_level(part: &PartEntry) -> bool {
+    matches!(part.kind, PartKind::Level(_))
+}

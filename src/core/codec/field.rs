@@ -1,0 +1,291 @@
+//! The decoded coefficients of a block, for every scheme.
+
+use super::WindowCodec;
+use super::buffer::Buffer;
+use super::codes::Codes;
+use super::pyramid::PredictionPasses;
+use super::real::Real;
+use super::rows::{self, Change};
+use crate::base::vectors::dispatch;
+use crate::wavelet::{LANES, Lane, TimeBasis};
+use wavesplat_format::{Pyramid, SparseCodes};
+
+/// The decoded coefficients of a block.
+#[derive(Debug)]
+pub struct Field<'a> {
+    values: Values<'a>,
+    /// Whether each k may have coefficients that are not zero.
+    marked: Vec<bool>,
+}
+
+/// `k * voxels + voxel`
+#[derive(Debug)]
+enum Values<'a> {
+    /// All are zero.
+    Zero,
+    /// Codes times a step.
+    Codes {
+        /// A coefficient is its code times this.
+        step: f64,
+        /// `k * voxels + voxel`.
+        codes: &'a [i32],
+    },
+    /// Decoded by a pyramid in 32-bit floats.
+    Single(Buffer<f32>),
+    /// Decoded by a pyramid in 64-bit floats.
+    Double(Buffer<f64>),
+}
+
+/// The coefficients of one k of a block, x fastest.
+#[derive(Debug, Clone, Copy)]
+pub enum Plane<'a> {
+    /// All are zero.
+    Zero,
+    /// 32-bit floats.
+    Single(&'a [f32]),
+    /// 64-bit floats.
+    Double(&'a [f64]),
+}
+
+impl<'a> Plane<'a> {
+    /// Decodes one k of a block. Each k must be coded by itself.
+    pub(super) fn decode(
+        codec: &WindowCodec,
+        size: [usize; 3],
+        step: f64,
+        codes: &Codes,
+        k: usize,
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
+    ) -> Self {
+        let Some(pyramid) = &codec.scheme.pyramid else {
+            let voxels: usize = codec.decoded_size(size).iter().product();
+            return Self::scaled(step, codes.dense().get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
+        };
+        let (passes, codes) = (codec.passes(pyramid, size), codes.sparse());
+        match pyramid.single {
+            true if passes.decode_one(k, step, codes, single) => Self::Single(single),
+            false if passes.decode_one(k, step, codes, double) => Self::Double(double),
+            _ => Self::Zero,
+        }
+    }
+
+    fn scaled(step: f64, codes: &[i32], scratch: &'a mut Vec<f64>) -> Self {
+        if rows::all_zero(codes) {
+            return Self::Zero;
+        }
+        scratch.resize(codes.len(), 0.0);
+        dispatch!(scale(step, codes, &mut scratch[..]));
+        Self::Double(scratch)
+    }
+}
+
+impl Field<'static> {
+    /// Decodes the codes of a block that a pyramid refines, of every k that `wanted` marks.
+    pub(super) fn refined(
+        codec: &WindowCodec,
+        size: [usize; 3],
+        step: f64,
+        codes: &SparseCodes,
+        wanted: &[bool],
+    ) -> Self {
+        let (values, marked) = match &codec.scheme.pyramid {
+            Some(pyramid) if pyramid.single => {
+                refined(&codec.passes(pyramid, size), step, codes, wanted, Values::Single)
+            }
+            Some(pyramid) => refined(&codec.passes(pyramid, size), step, codes, wanted, Values::Double),
+            None => (Values::Zero, vec![false; codec.basis.coefficients()]),
+        };
+        Self { values, marked }
+    }
+}
+
+impl Field<'_> {
+    /// Bytes of memory that the coefficients take.
+    pub fn held_bytes(&self) -> usize {
+        match &self.values {
+            Values::Zero | Values::Codes { .. } => 0,
+            Values::Single(values) => size_of_val(&values[..]),
+            Values::Double(values) => size_of_val(&values[..]),
+        }
+    }
+}
+
+impl<'a> Field<'a> {
+    /// Decodes all codes of a block. Without codes, all coefficients are zero.
+    pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a Codes) -> Self {
+        match codes {
+            Codes::Dense(codes) if !codes.is_empty() => {
+                let marked = vec![true; codec.basis.coefficients()];
+                Self { values: Values::Codes { step, codes }, marked }
+            }
+            _ => Field::refined(codec, size, step, codes.sparse(), &vec![true; codec.basis.coefficients()]),
+        }
+    }
+
+    /// The coefficient at `k * voxels + voxel`.
+    pub fn at(&self, index: usize) -> f64 {
+        match &self.values {
+            Values::Zero => 0.0,
+            Values::Codes { step, codes } => f64::from(codes[index]) * step,
+            Values::Single(values) => values[index].into(),
+            Values::Double(values) => values[index],
+        }
+    }
+
+    /// All coefficients, if they are 32-bit floats.
+    pub(super) fn singles(&self) -> Option<&[f32]> {
+        if let Values::Single(values) = &self.values { Some(values) } else { None }
+    }
+
+    /// The change from leaving out each level part of a pyramid and all finer ones.
+    pub(super) fn changes(&self, passes: &PredictionPasses<'_>, step: f64, codes: &SparseCodes) -> Vec<Change> {
+        match &self.values {
+            Values::Single(field) => passes.changes(step, codes, field),
+            Values::Double(field) => passes.changes(step, codes, field),
+            Values::Zero | Values::Codes { .. } => vec![Change::default(); usize::from(Pyramid::PARTS)],
+        }
+    }
+
+    /// Copies coefficients from index `first` on.
+    fn load(&self, first: usize, out: &mut [f64]) {
+        match &self.values {
+            Values::Zero => out.fill(0.0),
+            Values::Codes { step, codes } => dispatch!(scale(*step, &codes[first..], out)),
+            Values::Single(values) => dispatch!(widen(&values[first..], out)),
+            Values::Double(values) => out.copy_from_slice(&values[first..first + out.len()]),
+        }
+    }
+
+    /// Calls `visit(index of the first, values)` for all decoded samples, a run of voxels at a time.
+    pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
+        let used = Used::new(basis, &self.marked);
+        let basis = used.basis(basis);
+        let mut run = Run::new(basis, &used.ks);
+        for first in (0..voxels).step_by(RUN) {
+            let count = RUN.min(voxels - first);
+            run.load(self, voxels, first, count);
+            run.invert(basis, count.div_ceil(LANES));
+            (0..basis.frames()).for_each(|frame| visit(frame * voxels + first, &run.frame(frame)[..count]));
+        }
+    }
+
+    /// As [`Self::for_each_run`], if the coefficients are the samples.
+    pub(super) fn for_each_run_of_samples(&self, count: usize, mut visit: impl FnMut(usize, &[f64])) {
+        let mut run = [0.0; 8 * RUN];
+        for first in (0..count).step_by(run.len()) {
+            let run = &mut run[..(8 * RUN).min(count - first)];
+            self.load(first, run);
+            visit(first, run);
+        }
+    }
+
+    /// The coefficients of one k, converted into `scratch` if needed.
+    pub fn plane<'p>(&'p self, k: usize, voxels: usize, scratch: &'p mut Vec<f64>) -> Plane<'p> {
+        let range = k * voxels..(k + 1) * voxels;
+        match &self.values {
+            _ if !self.marked[k] => Plane::Zero,
+            Values::Zero => Plane::Zero,
+            Values::Codes { step, codes } => Plane::scaled(*step, &codes[range], scratch),
+            Values::Single(values) => Plane::Single(&values[range]),
+            Values::Double(values) => Plane::Double(&values[range]),
+        }
+    }
+
+    /// The decoded series of a voxel.
+    pub(super) fn series(&self, basis: &dyn TimeBasis, voxels: usize, voxel: usize) -> Vec<f64> {
+        let mut work = vec![Lane::default(); basis.coefficients()];
+        let mut series = vec![Lane::default(); basis.frames()];
+        work.iter_mut().enumerate().for_each(|(k, lane)| lane[0] = self.at(k * voxels + voxel));
+        basis.inverse(&mut work, &mut series);
+        series.iter().map(|lane| lane[0]).collect()
+    }
+}
+
+/// The coefficients that a block uses, and the basis restricted to them.
+pub(super) struct Used {
+    pub(super) ks: Vec<usize>,
+    basis: Option<Box<dyn TimeBasis>>,
+}
+
+impl Used {
+    /// Creates it from marks. All coefficients of unmarked k must be zero.
+    pub(super) fn new(basis: &dyn TimeBasis, marked: &[bool]) -> Self {
+        let basis = basis.only(marked);
+        let ks = (0..marked.len()).filter(|k| basis.is_none() || marked[*k]).collect();
+        Self { ks, basis }
+    }
+
+    pub(super) fn basis<'a>(&'a self, all: &'a dyn TimeBasis) -> &'a dyn TimeBasis {
+        self.basis.as_deref().unwrap_or(all)
+    }
+}
+
+/// The number of voxels decoded together. Their part of each plane fills whole cache lines.
+const RUN: usize = 128;
+
+/// The series of a run of voxels, in groups of [`LANES`].
+struct Run<'a> {
+    /// The coefficients used.
+    ks: &'a [usize],
+    /// `[voxels / LANES][index in ks]`
+    coefficients: Vec<Lane>,
+    /// `[voxels / LANES][frame]`
+    series: Vec<Lane>,
+    /// The values of one k or one frame.
+    row: [f64; RUN],
+}
+
+impl<'a> Run<'a> {
+    fn new(basis: &dyn TimeBasis, ks: &'a [usize]) -> Self {
+        let lanes = |each: usize| vec![Lane::default(); RUN / LANES * each];
+        Self { coefficients: lanes(ks.len()), series: lanes(basis.frames()), row: [0.0; RUN], ks }
+    }
+
+    fn load(&mut self, field: &Field<'_>, voxels: usize, first: usize, count: usize) {
+        for (i, k) in self.ks.iter().enumerate() {
+            field.load(k * voxels + first, &mut self.row[..count]);
+            let of_k = self.coefficients[i..].iter_mut().step_by(self.ks.len());
+            of_k.zip(self.row.as_chunks::<LANES>().0).for_each(|(lane, row)| *lane = *row);
+        }
+    }
+
+    fn invert(&mut self, basis: &dyn TimeBasis, lanes: usize) {
+        let each = self.ks.len();
+        for (i, series) in self.series.chunks_exact_mut(basis.frames()).enumerate().take(lanes) {
+            basis.inverse(&mut self.coefficients[i * each..][..each], series);
+        }
+    }
+
+    fn frame(&mut self, frame: usize) -> &[f64; RUN] {
+        let each = self.series.len() / (RUN / LANES);
+        let of_frame = self.series[frame..].iter().step_by(each);
+        self.row.as_chunks_mut::<LANES>().0.iter_mut().zip(of_frame).for_each(|(row, lane)| *row = *lane);
+        &self.row
+    }
+}
+
+#[inline(always)]
+fn scale(step: f64, codes: &[i32], out: &mut [f64]) {
+    out.iter_mut().zip(codes).for_each(|(v, code)| *v = f64::from(*code) * step);
+}
+
+#[inline(always)]
+fn widen(values: &[f32], out: &mut [f64]) {
+    out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
+}
+
+fn refined<'a, R: Real>(
+    passes: &PredictionPasses<'_>,
+    step: f64,
+    codes: &SparseCodes,
+    wanted: &[bool],
+    values: fn(Buffer<R>) -> Values<'a>,
+) -> (Values<'a>, Vec<bool>) {
+    if codes.count() == 0 {
+        return (Values::Zero, vec![false; passes.nodes()[3]]);
+    }
+    let mut field = Buffer::with_len(passes.nodes().iter().product());
+    let marked = passes.decode_some(wanted, step, codes, &mut field);
+    (values(field), marked)
+}

@@ -1,0 +1,214 @@
+//! Codes and decodes one block within an error bound. Pure functions over slices; no I/O, no threads.
+//!
+//! [`encode`] transforms, truncates and quantises samples, decodes the result, and stores the samples that miss the
+//! bound exactly. [`decode`] is the only decoder: the encoder checks itself with it, and `extract`, `verify` and the
+//! renderer use it. Nothing here depends on the kind of transform along time, except that samples without one
+//! (`Basis::Samples`) may also be predicted along time.
+
+pub mod bound;
+pub mod buffer;
+mod check;
+pub mod coarse;
+pub(crate) mod codes;
+pub mod decode;
+pub mod encode;
+mod error_weights;
+pub mod field;
+mod gain;
+mod load;
+pub(crate) mod pyramid;
+pub mod real;
+mod refine;
+mod repack;
+mod rows;
+pub mod block_with_ghosts;
+pub mod scheme;
+pub mod trial;
+mod truncate;
+
+use crate::base::sample::{self, SampleType};
+use crate::codec::bound::{ErrorBound, difference_up};
+use crate::wavelet::{self, LANES, TimeBasis};
+use pyramid::PredictionPasses;
+use scheme::Scheme;
+use std::ops::Range;
+use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
+
+/// What coding and decoding share for all blocks of one window.
+#[derive(Debug)]
+pub struct WindowCodec {
+    /// How blocks are coded.
+    pub scheme: Scheme,
+    /// The temporal basis.
+    pub basis: Box<dyn TimeBasis>,
+    /// The basis functions: `synthesis[k][t]` is u_k(t).
+    pub synthesis: Vec<Vec<f64>>,
+    /// The largest sum over k of |u_k(t)| (eq 25).
+    pub gain: f64,
+    /// The type of the samples.
+    pub sample: SampleType,
+    /// The guaranteed error bound.
+    pub bound: ErrorBound,
+    /// The sample value that means "missing", besides NaN and infinities.
+    pub missing_value: Option<f64>,
+    /// If set, extracted samples are clamped to this range, the range of the source's samples in the window.
+    pub clip: Option<(f64, f64)>,
+    /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
+    pub levels: Vec<Range<usize>>,
+    /// The level of detail: blocks are decoded on the lattice of every 2^lod-th voxel along each axis.
+    pub lod: u32,
+}
+
+impl WindowCodec {
+    /// Creates the codec of a window of `frames` frames. Blocks have at most `edge` voxels a side.
+    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, bound: ErrorBound, edge: usize) -> Self {
+        let basis = scheme.time_basis(frames);
+        let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), edge) };
+        Self::with_levels(scheme, basis, sample, bound, &levels)
+    }
+
+    fn with_levels(
+        scheme: Scheme,
+        basis: Box<dyn TimeBasis>,
+        sample: SampleType,
+        bound: ErrorBound,
+        levels: &[usize],
+    ) -> Self {
+        let synthesis = wavelet::synthesis(basis.as_ref());
+        let gain = wavelet::gain(&synthesis);
+        let levels = wavelet::ranges(levels);
+        Self { scheme, basis, synthesis, gain, sample, bound, missing_value: None, clip: None, levels, lod: 0 }
+    }
+
+    /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.
+    pub fn from_metadata(file: &Metadata, window: &Window) -> std::result::Result<Self, wavesplat_format::Error> {
+        let scheme = Scheme::from_window(window);
+        let basis = scheme.time_basis(window.frames as usize);
+        if basis.coefficients() != window.coefficients as usize {
+            let what =
+                format!("{} coefficients for {} frames of {:?}", window.coefficients, window.frames, window.basis);
+            return Err(wavesplat_format::Error::Invalid(what));
+        }
+        let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
+        let bound = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
+        let codec = Self::with_levels(scheme, basis, file.sample, bound, &levels);
+        let clip = Some((window.min, window.max)).filter(|(lo, hi)| lo <= hi && is_clipped(file));
+        Ok(Self { missing_value: file.missing_value, clip, ..codec })
+    }
+
+    /// The largest number of level parts of a block.
+    pub fn parts(&self) -> usize {
+        if self.scheme.pyramid.is_some() { usize::from(Pyramid::PARTS) } else { self.levels.len() }
+    }
+
+    /// Whether a level part affects the coefficients that `wanted` marks.
+    pub fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
+        match &self.scheme.pyramid {
+            None => wanted[self.levels[part].clone()].contains(&true),
+            Some(pyramid) if part > coarsest_part(pyramid, self.lod) => false,
+            // The last pass, along time, adds only the odd frames.
+            Some(_) if part == ODD_FRAMES => wanted.iter().skip(1).step_by(2).any(|w| *w),
+            Some(_) => true,
+        }
+    }
+
+    /// The voxels of a block that are decoded.
+    pub(crate) fn decoded_size(&self, size: [usize; 3]) -> [usize; 3] {
+        size.map(|n| n.div_ceil(1 << self.lod))
+    }
+
+    /// The voxels along x, y, z that are needed to code a block: its own, and the ones of following blocks that predict
+    /// them.
+    pub fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
+        let ghosts = self.scheme.pyramid.as_ref().map_or([0; 3], |pyramid| pyramid.ghost_nodes(size));
+        std::array::from_fn(|a| size[a] + ghosts[a])
+    }
+
+    /// The passes that decode a block at the codec's level of detail.
+    pub(crate) fn passes<'a>(&self, pyramid: &'a Pyramid, size: [usize; 3]) -> PredictionPasses<'a> {
+        PredictionPasses::with_detail(pyramid, size, self.basis.coefficients(), self.lod)
+    }
+
+    /// Without a pyramid: the range of codes in a level part of a block of `size` voxels.
+    fn level_range(&self, level: u8, size: [usize; 3]) -> Range<usize> {
+        let (voxels, k) = (size.iter().product::<usize>(), &self.levels[usize::from(level)]);
+        k.start * voxels..k.end * voxels
+    }
+
+    /// The number of frames in the window.
+    pub fn frames(&self) -> usize {
+        self.basis.frames()
+    }
+
+    /// Whether a sample is missing: not finite, or equal to the declared value.
+    pub fn is_missing(&self, value: f64) -> bool {
+        sample::is_missing(value, self.missing_value)
+    }
+
+    /// The larger of the errors of the splatted and the extracted value, rounded up. Infinite if the extracted value
+    /// would be read as missing.
+    pub fn error(&self, splatted: f64, extracted: f64, source: f64) -> f64 {
+        let (a, b) = (difference_up(splatted, source), difference_up(extracted, source));
+        let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
+        if lost { f64::INFINITY } else { a.max(b) }
+    }
+}
+
+/// The setting that marks files whose extracted samples are clamped to the range of the source.
+pub const CLIP: (&str, &str) = ("clip", "true");
+
+/// Whether extracted samples are clamped to the range of the source.
+fn is_clipped(file: &Metadata) -> bool {
+    file.settings.iter().any(|(name, value)| (name.as_str(), value.as_str()) == CLIP)
+}
+
+/// The last level part that a level of detail needs.
+fn coarsest_part(pyramid: &Pyramid, lod: u32) -> usize {
+    // In one piece, passes along time hold codes of every lattice.
+    let divided = pyramid.packing == Packing::Nested || !pyramid.order.contains(&Axis::T);
+    match lod {
+        1 if divided => 1,
+        2.. if divided => 0,
+        _ => ODD_FRAMES,
+    }
+}
+
+/// The level part of a pyramid with the last pass along time.
+const ODD_FRAMES: usize = Pyramid::PARTS as usize - 1;
+
+/// Small coarse levels are joined until a part of a whole block holds at least this many coefficients.
+const PART_COEFFICIENTS: usize = 1 << 17;
+
+fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
+    let mut parts = Vec::new();
+    let mut open = 0;
+    for level in levels {
+        open += level;
+        if open * edge * edge * edge >= PART_COEFFICIENTS {
+            parts.push(std::mem::take(&mut open));
+        }
+    }
+    match parts.last_mut() {
+        Some(last) if open > 0 => *last += open,
+        None => parts.push(open),
+        _ => {}
+    }
+    parts
+}
+
+/// Splits voxels into groups of [`LANES`]: (first voxel, number in the group).
+fn lane_groups(voxels: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..voxels).step_by(LANES).map(move |first| (first, LANES.min(voxels - first)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_levels_are_joined() {
+        assert_eq!(join_levels(&[1, 1, 2, 4, 8, 16], 32), [4, 4, 8, 16]);
+        assert_eq!(join_levels(&[1, 1, 2, 4, 8, 16], 4), [32]);
+        assert_eq!(join_levels(&[1], 64), [1]);
+    }
+}

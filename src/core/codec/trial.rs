@@ -1,0 +1,135 @@
+//! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
+
+use super::WindowCodec;
+use super::block_with_ghosts::BlockWithGhosts;
+use super::error_weights::QuantizerSetup;
+use super::load::Missing;
+use super::real::Real;
+use super::refine::Source;
+use std::borrow::Cow;
+use wavesplat_format::Pyramid;
+
+/// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
+pub struct Trial<'a, R> {
+    size: [usize; 3],
+    samples: Cow<'a, [u8]>,
+    missing: Missing,
+    weighing: Option<QuantizerSetup>,
+    /// The nodes of the box, and the nodes beyond it that may predict them.
+    nodes: Vec<R>,
+    /// The voxels of these nodes along x, y, z.
+    outer: [usize; 3],
+}
+
+/// Scratch that trials reuse.
+#[derive(Default)]
+pub struct Scratch<R> {
+    field: Vec<R>,
+    split: Vec<R>,
+    codes: Vec<i32>,
+}
+
+impl<'a, R: Real> Trial<'a, R> {
+    /// Pyramids may use the nodes of `outer` voxels.
+    pub fn new(codec: &WindowCodec, of: BlockWithGhosts, outer: [usize; 3], samples: &'a [u8]) -> Self {
+        let size = of.size;
+        let (own, extended) = (of.own(codec, samples), of.extended(codec, outer, samples));
+        let around = Missing::find(codec, &extended);
+        let missing = Missing::find(codec, &own);
+        let weighing = QuantizerSetup::new(codec, &own, missing.magnitude);
+        let mut nodes = Vec::new();
+        if let Some(weighing) = &weighing {
+            Source { codec, size: outer, samples: &extended, missing: &around }.load(weighing, &mut nodes);
+        }
+        Self { size, samples: own, missing, weighing, nodes, outer }
+    }
+
+    /// The number of voxels in the box.
+    pub fn voxels(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// An estimate of the bytes of the box. Missing samples are left out, because they take the same bytes under every
+    /// scheme.
+    pub fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid, scratch: &mut Scratch<R>) -> usize {
+        self.coded(codec, pyramid, scratch).unwrap_or(self.samples.len())
+    }
+
+    /// As [`Self::bytes`]; none if the box must be stored exactly.
+    fn coded(
+        &self,
+        codec: &WindowCodec,
+        pyramid: &Pyramid,
+        Scratch { field, split, codes }: &mut Scratch<R>,
+    ) -> Option<usize> {
+        let source = Source { codec, size: self.size, samples: &self.samples, missing: &self.missing };
+        let weighing = self.weighing.as_ref()?;
+        let step = source.step::<R>(pyramid, weighing)?;
+        let passes = codec.passes(pyramid, self.size);
+        field.resize(passes.nodes().iter().product(), R::default());
+        codes.resize(passes.codes(), 0);
+        if !passes.encode(step, &self.nodes, self.outer, field, split, codes) {
+            return None;
+        }
+        let outliers = source.estimate_outliers(weighing, field, &passes.marked_codes(codes));
+        let packed = |part| pyramid.packing.estimate(&passes.part_of(part, codes));
+        let packed: usize = (0..Pyramid::PARTS).map(packed).sum();
+        // With too many outliers, all is stored exactly; the count still shows how near a better step is.
+        let rest = if source.outliers_affordable(outliers) { packed } else { self.samples.len() };
+        Some(rest + outliers * (GAP + codec.sample.size()))
+    }
+}
+
+/// Bytes for the position of an outlier, less the bytes that packing its sample saves.
+const GAP: usize = 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::sample::{self, SampleType};
+    use crate::codec::bound::{Bound, ErrorBound};
+    use crate::codec::encode::Encoder;
+    use crate::codec::scheme::{Axis, Basis, Scheme, Stencil};
+    use wavesplat_format::{BlockId, Packing};
+
+    const SIZE: [usize; 3] = [20, 18, 16];
+    const FRAMES: usize = 16;
+
+    /// Waves with a little noise.
+    fn samples() -> Vec<u8> {
+        let noise = |i: usize| f64::from((i as u32).wrapping_mul(0x9E37_79B1) >> 16) / 65536.0 - 0.5;
+        let voxels: usize = SIZE.iter().product();
+        let value = |i: usize| ((i % 20) as f64 / 5.0 + (i / voxels) as f64 / 9.0).sin() + 0.02 * noise(i);
+        let values: Vec<f64> = (0..voxels * FRAMES).map(value).collect();
+        let mut bytes = vec![0; 4 * values.len()];
+        sample::store(SampleType::F32, &values, &mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn estimates_are_close_to_what_is_stored() {
+        let (samples, xyzt) = (samples(), [Axis::X, Axis::Y, Axis::Z, Axis::T]);
+        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
+        for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyzt[..3]), (Basis::Samples, 1.0, &xyzt[..])] {
+            let (order, stencil) = (order.to_vec(), Stencil::Cubic);
+            let pyramid = Pyramid {
+                order,
+                stencil,
+                growth: 1.5,
+                most: 3.0,
+                single: true,
+                packing: Packing::Nested,
+                ghosts: true,
+            };
+            let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
+            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 32);
+            let mut encoder = Encoder::new(3).expect("a usual level");
+            let id = BlockId { window: 0, block: 0, channel: 0 };
+            let encoded = encoder.block(&codec, id, SIZE, &samples).expect("a small block");
+            let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
+            let trial = Trial::<f32>::new(&codec, SIZE.into(), codec.outer_size(SIZE), &samples);
+            let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());
+            assert!(estimate.abs_diff(stored) * 20 < stored, "{basis:?}: {estimate} for {stored}");
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! The parts of wavesplat that everything else uses. The package `wavesplat` explains them, and is what programs depend on.
+
+pub use wavesplat_format as format;
+
+pub mod base;
+pub mod colour;
+pub mod source;
+pub mod wavelet;
+pub mod codec;
+pub mod view;
+#[doc = include_str!("bibliography.md")]
+pub mod bibliography {}

@@ -1,0 +1,436 @@
+//! Chooses the scheme of a window: the one that makes some of its boxes smallest.
+//!
+//! Candidates are a learned basis along time (eq 20) with a pyramid in space, pyramids in space and time (eq 32) whose passes
+//! along time come first or last, and pyramids in space alone, frame by frame. The first suits slow change and noise, the
+//! others fronts and moving things, the last those that move by more than their size from frame to frame. Axes come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
+//! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33), the growth of steps (eq 34) and ghost
+//! nodes.
+
+use super::learn::learned_functions;
+use super::smoothness::{AXES, roughest_first};
+use super::{ConvertConfig, Pool};
+use rayon::prelude::*;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::sample::{self, SampleType};
+use wavesplat_core::base::spread::evenly;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
+use wavesplat_core::codec::bound::{ErrorBound, Measure};
+use wavesplat_core::codec::real::Real;
+use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
+use wavesplat_core::codec::trial::{Scratch, Trial};
+use wavesplat_core::source::{Archive, FrameWindow, read_frames};
+use wavesplat_core::wavelet::Basis;
+use wavesplat_format::Packing;
+
+/// The fixed parts of a scheme; the rest is chosen for each window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SchemeConstraint {
+    /// The transform along time; none allows any.
+    pub basis: Option<Basis>,
+    /// The pyramid.
+    pub space: SpatialPredictor,
+}
+
+/// How coefficients are predicted in space, or samples in space and time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SpatialPredictor {
+    /// A pyramid with whichever stencil suits.
+    Any,
+    /// No prediction: every series is coded by itself.
+    Alone,
+    /// A pyramid with this stencil.
+    Pyramid(Stencil),
+}
+
+impl SchemeConstraint {
+    /// No constraint: everything is chosen.
+    pub const AUTO: Self = Self { basis: None, space: SpatialPredictor::Any };
+}
+
+impl From<Basis> for SchemeConstraint {
+    /// The bases of [Dobashi](wavesplat_core::bibliography) along time alone, others with a pyramid.
+    fn from(basis: Basis) -> Self {
+        let space = match basis {
+            Basis::Haar | Basis::Multi => SpatialPredictor::Alone, // the published method, for comparisons
+            Basis::Samples | Basis::Learned => SpatialPredictor::Any, // only a pyramid makes these files small
+        };
+        Self { basis: Some(basis), space }
+    }
+}
+
+/// The largest number of samples in all boxes, for blocks of `block` samples.
+pub(super) fn most_samples(block: usize) -> usize {
+    (5 * block / 4).max(FEW_SAMPLES)
+}
+
+/// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
+/// trial.
+pub(super) fn bytes(block: usize, sample: SampleType) -> usize {
+    most_samples(block) * (sample.size() + 2 * (size_of::<f64>() + 1) + size_of::<f64>() + size_of::<i32>())
+}
+
+/// The inputs of a choice.
+pub(super) struct SchemeSelector<'a> {
+    pub(super) config: &'a ConvertConfig,
+    pub(super) archive: &'a Archive,
+    /// The window's samples, channel by channel.
+    pub(super) channels: &'a [&'a dyn FrameWindow],
+    pub(super) promise: ErrorBound,
+    /// The largest absolute sample of the window.
+    pub(super) magnitude: f64,
+    /// [`most_samples`]
+    pub(super) most: usize,
+    /// How the file's codes are packed.
+    pub(super) packing: Packing,
+    /// The previous window's scheme, if the choice may start from it.
+    pub(super) before: Option<&'a Scheme>,
+}
+
+/// A box of samples, frame by frame.
+struct Sampled {
+    size: BlockWithGhosts,
+    /// The voxels that pyramids may use.
+    outer: [usize; 3],
+    samples: Vec<u8>,
+}
+
+/// A transform along time, and the transformed boxes.
+struct Transformed<'a, R> {
+    basis: Basis,
+    boxes: Vec<Trial<'a, R>>,
+}
+
+/// The boxes for trials, and reusable scratch.
+struct Trials<'a, R> {
+    boxes: Vec<Transformed<'a, R>>,
+    idle: Pool<Scratch<R>>,
+}
+
+impl SchemeSelector<'_> {
+    /// The scheme that codes some boxes of the window in the fewest bytes. It does not depend on the number of threads.
+    pub(super) fn choose(&self) -> Result<Scheme> {
+        if let SchemeConstraint { basis: Some(basis), space: SpatialPredictor::Alone } = self.config.coding
+            && basis != Basis::Learned
+        {
+            return Ok(Scheme::along_time(basis));
+        }
+        if self.promise.delta <= 0.0 {
+            return Ok(Scheme::along_time(self.config.coding.basis.unwrap_or(Basis::Samples))); // all is stored exactly
+        }
+        if self.config.coding.space == SpatialPredictor::Alone {
+            let (basis, functions) = (Basis::Learned, self.functions()?);
+            let coarseness = self.coarseness(COARSE);
+            return Ok(Scheme { functions, coarseness, ..Scheme::along_time(basis) });
+        }
+        if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() }
+    }
+
+    /// The smallest of all families with a pyramid and their variants.
+    fn smallest<R: Real + Send + Sync>(&self) -> Result<Scheme> {
+        let boxes = self.boxes()?;
+        let families = self.families(&self.order(&boxes))?;
+        let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Pool::default() };
+        let families: Vec<_> = families.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
+        let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
+        let promising = families.into_iter().filter(|f| f.0 <= least * PROMISING);
+        if let Some(before) = self.before {
+            let best = promising.clone().reduce(fewer);
+            if let Some((_, scheme)) = best.filter(|best| best.1.basis == before.basis) {
+                return Ok(scheme);
+            }
+        }
+        let tuned = promising.map(|f| self.coarsest(f, &trials));
+        let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
+        for variants in [Self::orders, Self::stencils, Self::growths, Self::ghosts] {
+            let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
+            best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
+        }
+        Ok(best.1)
+    }
+
+    /// The boxes under each of the schemes' transforms along time.
+    fn transformed<'a, R: Real + Send + Sync>(
+        &self,
+        schemes: &[Scheme],
+        boxes: &'a [Sampled],
+    ) -> Vec<Transformed<'a, R>> {
+        let mut found: Vec<Transformed<'a, R>> = Vec::new();
+        for scheme in schemes {
+            if found.iter().all(|f| f.basis != scheme.basis) {
+                let codec = self.codec(scheme);
+                let trial = |b: &'a Sampled| Trial::new(&codec, b.size, b.outer, &b.samples);
+                found.push(Transformed { basis: scheme.basis, boxes: boxes.par_iter().map(trial).collect() });
+            }
+        }
+        found
+    }
+
+    /// The scheme with the step that makes the boxes smallest. A coarseness of exactly 1 stays.
+    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &Trials<'_, R>) -> (f64, Scheme) {
+        if first.1.coarseness == 1.0 {
+            return first;
+        }
+        let coarser = self.while_smaller(&first, COARSER, trials);
+        if coarser.0 < first.0 { coarser } else { self.while_smaller(&first, 1.0 / COARSER, trials) }
+    }
+
+    fn while_smaller<R: Real + Send + Sync>(
+        &self,
+        first: &(f64, Scheme),
+        factor: f64,
+        trials: &Trials<'_, R>,
+    ) -> (f64, Scheme) {
+        let mut best = first.clone();
+        loop {
+            let next = self.with_step(&best.1, factor, trials);
+            if next.0 >= best.0 {
+                return best;
+            }
+            best = next;
+        }
+    }
+
+    fn with_step<R: Real + Send + Sync>(&self, scheme: &Scheme, factor: f64, trials: &Trials<'_, R>) -> (f64, Scheme) {
+        self.tried(Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() }, trials)
+    }
+
+    /// A scheme with its estimated bytes of the window.
+    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &Trials<'_, R>) -> (f64, Scheme) {
+        (self.bytes(&scheme, trials), scheme)
+    }
+
+    /// The number of frames in the window.
+    fn frames(&self) -> usize {
+        self.channels[0].frames()
+    }
+
+    /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
+    /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
+    fn boxes(&self) -> Result<Vec<Sampled>> {
+        let dims = self.archive.grid.dims;
+        let voxels = dims.iter().product::<usize>() * self.channels.len();
+        let least = LEAST_BOXES.max(self.channels.len());
+        // Double precision takes more memory.
+        let most = if self.single() { self.most } else { self.most / 3 * 2 };
+        let most = (voxels / LARGEST_SHARE).min(most / self.frames());
+        let volume = |size: &[usize; 3]| size.iter().product::<usize>();
+        let size = EDGES.map(|edge| dims.map(|n| n.min(edge)));
+        let size = size.into_iter().find(|size| least * volume(size) <= most).unwrap_or([1; 3]);
+        let count = (voxels / SHARE / volume(&size)).clamp(least, MOST_BOXES).min(most / volume(&size)).max(1);
+        (0..count).map(|i| self.sampled(i, size)).collect()
+    }
+
+    /// Reads the box with this number. Its position is one of an evenly spread sequence, the same for every window;
+    /// channels take turns.
+    fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
+        let dims = self.archive.grid.dims;
+        // Blocks at far faces are followed by no other voxels. They are taken for every second box.
+        let outer = self.outer_size(size);
+        let ends = if number.is_multiple_of(2) { size } else { outer };
+        let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
+        let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
+        let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
+        let size = BlockWithGhosts { size, known };
+        let window = self.channels[number % self.channels.len()];
+        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
+        Ok(Sampled { size, outer, samples })
+    }
+
+    /// The voxels that coding a box by any pyramid takes.
+    fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
+        let ghosts = self.pyramid(&AXES, Stencil::Cubic).ghost_nodes(size);
+        std::array::from_fn(|axis| size[axis] + ghosts[axis])
+    }
+
+    /// The axes from the roughest to the smoothest.
+    fn order(&self, boxes: &[Sampled]) -> [Axis; 4] {
+        let (ty, missing) = (self.archive.sample, self.config.missing_value);
+        let values = |b: &Sampled| {
+            let mut values = vec![0.0; b.samples.len() / ty.size()];
+            sample::load(ty, &b.samples, &mut values);
+            values.iter_mut().filter(|v| sample::is_missing(**v, missing)).for_each(|v| *v = f64::NAN);
+            let [x, y, z] = b.size.known;
+            (values, [x, y, z, self.frames()])
+        };
+        roughest_first(boxes.iter().map(values), self.promise.delta)
+    }
+
+    /// One scheme with a pyramid for each allowed transform along time.
+    fn families(&self, order: &[Axis; 4]) -> Result<Vec<Scheme>> {
+        let SchemeConstraint { basis, space } = self.config.coding;
+        let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
+        let along_time = match basis {
+            None => (self.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
+            Some(Basis::Samples) => None,
+            forced => forced,
+        };
+        let in_space: Vec<Axis> = order.iter().copied().filter(|axis| *axis != Axis::T).collect();
+        let mut found = Vec::new();
+        if let Some(basis) = along_time {
+            let functions = if basis == Basis::Learned { self.functions()? } else { Vec::new() };
+            let pyramid = Some(self.pyramid(&in_space, stencil));
+            found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
+        }
+        if basis.is_none_or(|b| b == Basis::Samples) {
+            let time_first = [&[Axis::T], &in_space[..]].concat();
+            let time_last = [&in_space[..], &[Axis::T]].concat();
+            for order in [time_first, time_last, in_space] {
+                let (coarseness, pyramid) = (self.coarseness(1.0), Some(self.pyramid(&order, stencil)));
+                found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
+            }
+        }
+        if let Some(before) = self.before {
+            let begin = |scheme: &mut Scheme| {
+                scheme.pyramid = before.pyramid.as_ref().map(|p| Pyramid { single: self.single(), ..p.clone() });
+                scheme.coarseness = before.coarseness;
+            };
+            found.iter_mut().filter(|scheme| scheme.basis == before.basis).for_each(begin);
+            found.dedup();
+        }
+        Ok(found)
+    }
+
+    /// The learned functions, from rows all over the volume instead of the boxes used for trials.
+    fn functions(&self) -> Result<Vec<i16>> {
+        let size = [self.archive.grid.dims[0], 1, 1];
+        let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
+        let rows: Result<Vec<Sampled>> = (0..rows).map(|i| self.sampled(LEARNING + i, size)).collect();
+        let (ty, frames) = (self.archive.sample, self.frames());
+        let samples = rows?;
+        let samples = samples.iter().map(|row| &row.samples[..]);
+        Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))
+    }
+
+    fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
+        let ((growth, most), ghosts) = (GROWTHS[0], self.packing == Packing::Nested);
+        Pyramid { order: order.to_vec(), stencil, growth, most, single: self.single(), packing: self.packing, ghosts }
+    }
+
+    /// Whether 32-bit floats are precise enough.
+    fn single(&self) -> bool {
+        let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&self.promise.delta) && self.magnitude < MOST_SINGLE;
+        normal && self.promise.delta >= self.magnitude * SINGLE
+    }
+
+    /// The first coarseness to try. Under a bound of the mean, steps leave a budget for dropped coefficients
+    /// ([`ErrorBound::step`]).
+    fn coarseness(&self, of_largest: f64) -> f64 {
+        match self.promise.measure() {
+            Measure::Largest => of_largest,
+            Measure::RootMeanSquare => COARSE_OF_MEANS,
+        }
+    }
+
+    /// The next order: the last two axes are those that are predicted best, and nearly equally well.
+    fn orders(&self, best: &Scheme) -> Vec<Scheme> {
+        let swapped = |p: &Pyramid| {
+            let mut order = p.order.clone();
+            let last = order.len() - 1;
+            order.swap(last - 1, last);
+            vec![Pyramid { order, ..p.clone() }]
+        };
+        variants(best, swapped)
+    }
+
+    fn stencils(&self, best: &Scheme) -> Vec<Scheme> {
+        match self.config.coding.space {
+            SpatialPredictor::Any => {
+                variants(best, |pyramid| vec![Pyramid { stencil: Stencil::Linear, ..pyramid.clone() }])
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn growths(&self, best: &Scheme) -> Vec<Scheme> {
+        let others = &GROWTHS[1..];
+        variants(best, |p| others.iter().map(|&(growth, most)| Pyramid { growth, most, ..p.clone() }).collect())
+    }
+
+    fn ghosts(&self, best: &Scheme) -> Vec<Scheme> {
+        let other = |p: &Pyramid| if p.ghosts { vec![Pyramid { ghosts: false, ..p.clone() }] } else { Vec::new() };
+        variants(best, other)
+    }
+
+    /// Estimates the bytes of the window.
+    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
+        let codec = self.codec(scheme);
+        let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
+        let bytes = |b: &Trial<'_, R>| {
+            let mut scratch = trials.idle.take().unwrap_or_default();
+            let bytes = b.bytes(&codec, pyramid, &mut scratch);
+            trials.idle.put(scratch);
+            (bytes, b.voxels())
+        };
+        let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let whole = self.archive.grid.dims.iter().product::<usize>() * self.channels.len();
+        bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64
+    }
+
+    fn codec(&self, scheme: &Scheme) -> WindowCodec {
+        let frames = self.frames();
+        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGES[0]);
+        codec.missing_value = self.config.missing_value;
+        codec
+    }
+}
+
+/// The scheme with fewer bytes; the first if equal.
+fn fewer(a: (f64, Scheme), b: (f64, Scheme)) -> (f64, Scheme) {
+    if b.0 < a.0 { b } else { a }
+}
+
+fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme> {
+    let pyramids = best.pyramid.as_ref().map(of).unwrap_or_default();
+    pyramids.into_iter().map(|pyramid| Scheme { pyramid: Some(pyramid), ..best.clone() }).collect()
+}
+
+/// The number of samples that may always be read.
+const FEW_SAMPLES: usize = 1 << 17;
+
+/// The edges of boxes for trials, in voxels: multiples of eight have coarse lattices like those of blocks.
+const EDGES: [usize; 8] = [40, 32, 24, 16, 8, 4, 2, 1];
+
+/// One voxel in this many is used for trials.
+const SHARE: usize = 50;
+
+/// The smallest and the largest number of boxes for trials.
+const LEAST_BOXES: usize = 2;
+const MOST_BOXES: usize = 12;
+
+/// At most one voxel in this many is used for trials.
+const LARGEST_SHARE: usize = 8;
+
+/// The number of rows that functions are learned from, and the number of the first position.
+const ROWS: usize = 64;
+const LEARNING: usize = 1000;
+
+/// A scheme is tuned only if its estimate is at most this many times the smallest.
+const PROMISING: f64 = 1.3;
+
+/// A variant is used only if it makes boxes smaller by this factor: smaller gains do not carry over to blocks, which
+/// are larger.
+const CLEARLY: f64 = 0.99;
+
+/// The shrinkage of steps of coarser levels, and its limit; the choice begins with the first.
+const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];
+
+/// The first step to try with learned functions, relative to the step for which rounding alone stays within the bound.
+const COARSE: f64 = 3.92;
+
+/// As [`COARSE`], for any basis under a bound of the mean. A first step further from the best would reject families
+/// that win when tuned.
+const COARSE_OF_MEANS: f64 = 2.8;
+
+/// Steps grow or shrink by this factor while the estimate improves.
+const COARSER: f64 = 1.4;
+
+/// The smallest bound relative to the largest sample at which 32-bit floats are used: their rounding then takes almost
+/// none of it.
+const SINGLE: f64 = 1.0 / (1 << 15) as f64;
+
+/// Magnitudes at which 32-bit floats have full precision, and their sums and products are finite.
+const LEAST_SINGLE: f64 = 1e-30;
+const MOST_SINGLE: f64 = 1e30;

@@ -1,0 +1,265 @@
+//! Estimates the size of a coefficient file by coding some blocks of some windows.
+
+use super::coded_input::CodedInput;
+use super::gather::{Batch, WindowReader};
+use super::record::WindowWriter;
+use super::variation::Variation;
+use super::warnings::Findings;
+use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Target, WindowJob, WindowsDone, encode_batch};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::io;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::BlockGrid;
+use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::sample::{self, join_ranges};
+use wavesplat_core::base::spread::evenly;
+use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
+use wavesplat_core::codec::bound::range_bound;
+use wavesplat_core::codec::encode::Encoded;
+use wavesplat_core::source::scan::{Scan, scan_frame};
+use wavesplat_core::source::{Archive, FrameSource, FrameWindow, read_frames_into};
+
+/// The largest number of blocks coded in a window, and of windows.
+const BLOCKS: usize = 24;
+const WINDOWS: usize = 3;
+
+/// The estimated size of an archive's coefficient file.
+#[derive(Debug, Clone, Serialize)]
+pub struct Estimate {
+    /// Bytes of the coefficient file.
+    pub bytes: u64,
+    /// The compression ratio: bytes of the samples divided by `bytes`.
+    pub ratio: f64,
+    /// The tolerance.
+    pub tolerance: f64,
+    /// The error that it allows, in the samples' unit.
+    pub error: f64,
+    /// Share of the changing voxels of the coded blocks whose standard deviation over a window's frames is less than
+    /// this error; `None` if no voxel changes.
+    pub lost: Option<f64>,
+    /// The value range that it refers to, from a few frames of each coded window and the last frame.
+    pub range: (f64, f64),
+    /// Blocks that were coded in each window.
+    pub blocks: usize,
+    /// Windows with coded blocks.
+    pub windows: usize,
+}
+
+/// Converts some blocks, spread over the volume and over time, and scales their size to the whole archive. For a bound
+/// that refers to a range.
+///
+/// # Errors
+/// Those of a conversion; also an error if the source is a stream.
+pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
+    estimates(source, std::slice::from_ref(config), progress)?
+        .pop()
+        .ok_or_else(|| Error::setting("tolerance", "is needed for an estimate"))
+}
+
+/// As [`estimate`] for several configurations, which differ only in their tolerance.
+///
+/// # Errors
+/// Those of [`estimate`].
+pub fn estimates(
+    source: &mut dyn FrameSource,
+    configs: &[ConvertConfig],
+    progress: &dyn Progress,
+) -> Result<Vec<Estimate>> {
+    let Some(config) = configs.first() else { return Ok(Vec::new()) };
+    let source_archive = source.archive().clone();
+    let Some(frames) = source_archive.frames.filter(|frames| *frames > 0) else {
+        return Err(Error::path(
+            STANDARD,
+            "an estimate needs frames that can be read more than once, not standard input",
+        ));
+    };
+    let source_archive = Archive { description: None, ..source_archive }; // it is not of some blocks
+    let first = CodedInput::new(config, &source_archive);
+    let plan = Plan::new(&first)?;
+    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, first.config.window));
+    progress.start(Some((windows.len() * configs.len()) as u64));
+    let read = FramesRead {
+        archive: &source_archive,
+        missing_value: first.config.missing_value,
+        plan: &plan,
+        blocks: &blocks,
+    };
+    let (found, variation) = read.range(source, &windows)?;
+    let mut estimated = |config: &ConvertConfig| {
+        let mut input = CodedInput::new(config, &source_archive);
+        let asked = input.clone();
+        let plan = Plan::new(&asked)?;
+        let range = *input.config.range.get_or_insert(found);
+        let (config, archive) = (&input.config, &input.archive);
+        let coded = BlocksCoded { input: &input, plan: &plan, blocks: &blocks, range: found };
+        let bytes = scaled(coded.bytes(source, &windows, progress)?, &coded, &windows, frames);
+        let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
+        let error = range_bound(config.tolerance, range);
+        let lost = variation.share_below(error).filter(|_| input.colour_transform.is_none());
+        let (ratio, tolerance) = (raw / bytes.max(1.0), config.tolerance);
+        let bytes = bytes as u64;
+        Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks: blocks.len(), windows: windows.len() })
+    };
+    let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>()?;
+    progress.finish();
+    Ok(estimates)
+}
+
+/// The bytes of all `frames`, if those of some blocks in some windows take `bytes`.
+fn scaled(bytes: u64, coded: &BlocksCoded<'_>, windows: &[Range<usize>], frames: usize) -> f64 {
+    let voxels = coded.blocks.iter().map(|block| coded.plan.blocks.region(*block).voxels()).sum::<usize>();
+    let samples = voxels * windows.iter().map(ExactSizeIterator::len).sum::<usize>();
+    let all = coded.input.archive.grid.whole().voxels() as f64 * frames as f64;
+    bytes as f64 * all / samples as f64
+}
+
+/// All blocks if they are few, else some, spread evenly over the volume.
+fn some_blocks(blocks: &BlockGrid) -> Vec<usize> {
+    if blocks.len() <= BLOCKS {
+        return (0..blocks.len()).collect();
+    }
+    let [nx, ny, nz] = blocks.counts();
+    let block = |number| {
+        let [x, y, z] = evenly(number, [nx, ny, nz]);
+        x + nx * (y + ny * z)
+    };
+    (0..BLOCKS).map(block).collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// The frames of all windows if they are few, else of some full ones, evenly spaced.
+fn some_windows(frames: usize, window: usize) -> Vec<Range<usize>> {
+    let all = frames.div_ceil(window);
+    let full = if all <= WINDOWS { all } else { frames / window };
+    let count = full.min(WINDOWS);
+    let firsts = (0..count).map(|i| (2 * i + 1) * full / (2 * count) * window);
+    firsts.map(|first| first..frames.min(first + window)).collect()
+}
+
+/// The frames that are read to find a value range.
+struct FramesRead<'a> {
+    archive: &'a Archive,
+    missing_value: Option<f64>,
+    plan: &'a Plan<'a>,
+    /// The coded blocks.
+    blocks: &'a [usize],
+}
+
+impl FramesRead<'_> {
+    /// The value range of the last frame and, in each window, of the first frame and of those with the least and the
+    /// largest sample of the coded blocks.
+    /// Also how much voxels of the coded blocks vary.
+    fn range(&self, source: &mut dyn FrameSource, windows: &[Range<usize>]) -> Result<((f64, f64), Variation)> {
+        let (mut range, mut variation) = (Scan::NOTHING.range, Variation::default());
+        for frames in windows {
+            let window = source.window(frames.start, frames.len())?;
+            for frame in self.extreme_frames(window.as_ref(), &mut variation)? {
+                range = join_ranges(range, self.range_of_frame(window.as_ref(), frame)?);
+            }
+        }
+        let last = source.window(self.archive.frames.unwrap_or(1) - 1, 1)?;
+        range = join_ranges(range, self.range_of_frame(last.as_ref(), 0)?);
+        Ok((if range.0 <= range.1 { range } else { (0.0, 0.0) }, variation))
+    }
+
+    /// The first frame of a window, and the frames with the least and the largest sample of the coded blocks.
+    fn extreme_frames(&self, window: &dyn FrameWindow, variation: &mut Variation) -> Result<BTreeSet<usize>> {
+        let mut ranges = vec![Scan::NOTHING.range; window.frames()];
+        let mut samples = Vec::new();
+        for (number, block) in self.blocks.iter().enumerate() {
+            let (region, ty) = (self.plan.blocks.region(*block), self.archive.sample);
+            read_frames_into(window, 0..window.frames(), &region, ty, &mut samples)?;
+            let extent = BlockWithGhosts { size: region.dims(), known: region.dims() };
+            variation.add_block(number, self.blocks.len(), &extent, ty, self.missing_value, &samples);
+            for (range, frame) in ranges.iter_mut().zip(samples.chunks_exact(region.voxels() * ty.size())) {
+                *range = join_ranges(*range, sample::range_of_present(ty, frame, self.missing_value, |_| {}));
+            }
+        }
+        let least = (0..ranges.len()).min_by(|a, b| ranges[*a].0.total_cmp(&ranges[*b].0));
+        let largest = (0..ranges.len()).max_by(|a, b| ranges[*a].1.total_cmp(&ranges[*b].1));
+        Ok([0].into_iter().chain(least).chain(largest).collect())
+    }
+
+    fn range_of_frame(&self, window: &dyn FrameWindow, frame: usize) -> Result<(f64, f64)> {
+        let Archive { grid, sample, .. } = self.archive;
+        Ok(scan_frame(Scan::NOTHING, window, frame, grid, *sample, self.missing_value)?.range)
+    }
+}
+
+/// The blocks that are coded, as if they were all of a file.
+struct BlocksCoded<'a> {
+    /// With the range that was found, if none is given.
+    input: &'a CodedInput,
+    plan: &'a Plan<'a>,
+    blocks: &'a [usize],
+    /// The value range that was found.
+    range: (f64, f64),
+}
+
+impl BlocksCoded<'_> {
+    /// The bytes of a file of these blocks in these windows.
+    fn bytes(&self, source: &mut dyn FrameSource, windows: &[Range<usize>], progress: &dyn Progress) -> Result<u64> {
+        let started = Instant::now();
+        let plan = self.plan.for_blocks(self.blocks.len());
+        let target = Target { name: Path::new("estimate"), out: io::sink(), resume_from: None };
+        let mut file = WindowWriter::new(self.input, &plan, target);
+        let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
+        let mut reader = WindowReader::new(self.input, self.plan, &done, &idle);
+        for (index, frames) in windows.iter().enumerate() {
+            let window = source.window(frames.start, frames.len())?;
+            let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range: self.range, ..Scan::NOTHING })?);
+            for batch in self.batches(&reader, window.as_ref(), &job) {
+                let encoded = encode_batch(self.input.config.level, self.plan, &encoders, &idle, batch?)?;
+                file.append(&self.renumbered(encoded))?;
+            }
+            progress.advance(1);
+        }
+        Ok(file.finish(started, Duration::ZERO, &Findings::default(), Duration::ZERO)?.output_bytes)
+    }
+
+    /// The samples of the coded blocks of all channels, in batches.
+    fn batches<'b>(
+        &'b self,
+        reader: &'b WindowReader<'_>,
+        window: &'b dyn FrameWindow,
+        job: &'b Arc<WindowJob>,
+    ) -> impl Iterator<Item = Result<Batch>> + 'b {
+        let (all, some) = (self.plan.blocks.len(), self.blocks.len());
+        let numbers: Vec<usize> =
+            (0..some * self.plan.channels()).map(|i| i / some * all + self.blocks[i % some]).collect();
+        (0..numbers.len()).step_by(self.plan.batch).map(move |first| {
+            let end = numbers.len().min(first + self.plan.batch);
+            let blocks = numbers[first..end].iter().map(|block| reader.gather(window, job, *block));
+            Ok(Batch { window: job.clone(), blocks: blocks.collect::<Result<_>>()?, last: end == numbers.len() })
+        })
+    }
+
+    /// Numbers blocks as if there were no others.
+    fn renumbered(&self, mut batch: EncodedBatch) -> EncodedBatch {
+        for Encoded { block, .. } in &mut batch.blocks {
+            let position = self.blocks.binary_search(&(block.id.block as usize));
+            block.id.block = position.unwrap_or_else(|next| next) as u32;
+        }
+        batch
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_spread_evenly() {
+        assert_eq!(some_blocks(&BlockGrid::cubes([30, 20, 10], 10)), [0, 1, 2, 3, 4, 5]);
+        let blocks = some_blocks(&BlockGrid::cubes([100, 100, 100], 10));
+        assert!((20..=BLOCKS).contains(&blocks.len()) && blocks.is_sorted() && blocks[0] < 250 && blocks[19] >= 750);
+        assert_eq!(some_windows(70, 32), [0..32, 32..64, 64..70]);
+        assert_eq!(some_windows(100, 32), [0..32, 32..64, 64..96]);
+        assert_eq!(some_windows(640, 32), [96..128, 320..352, 512..544]);
+    }
+}

@@ -1,0 +1,354 @@
+//! The reader stage: reads windows of frames and sends batches of blocks.
+
+use super::choose::{SchemeSelector, SpatialPredictor, most_samples};
+use super::coded_input::{BRIGHTNESS, CodedInput};
+use super::sampled::{self, Pixel};
+use super::warnings::{self, Fill, Findings};
+use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
+use crossbeam_channel::Sender;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::sample::{self, join_ranges};
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::bound::{self, Bound, ErrorBound};
+use wavesplat_core::codec::scheme::Scheme;
+use wavesplat_core::source::scan::{Scan, scan};
+use wavesplat_core::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
+use wavesplat_format::{BlockId, Features, FileId, Packing, Window};
+
+/// Blocks of one window with their samples.
+#[derive(Debug)]
+pub(super) struct Batch {
+    pub(super) window: Arc<WindowJob>,
+    pub(super) blocks: Vec<BlockSamples>,
+    /// Whether this is the last batch of its window. The source was still unchanged after it was read.
+    pub(super) last: bool,
+}
+
+/// The samples of a block, frame by frame.
+#[derive(Debug)]
+pub(super) struct BlockSamples {
+    pub(super) id: BlockId,
+    pub(super) samples: Vec<u8>,
+}
+
+/// Reads all windows in order until the frames end, and sends those that the file does not have yet. Returns the time
+/// spent reading, and what it saw in the samples.
+pub(super) fn read(
+    source: &mut dyn FrameSource,
+    input: &CodedInput,
+    plan: &Plan<'_>,
+    done: &WindowsDone,
+    idle: &Pool<Vec<u8>>,
+    out: &Sender<Batch>,
+) -> Result<(Duration, Findings)> {
+    let mut reader = WindowReader::new(input, plan, done, idle);
+    done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
+    reader.before = reader.frames;
+    let mut busy = Duration::ZERO;
+    for index in done.first_window.. {
+        let started = Instant::now();
+        let known = done.windows.get(index);
+        let Some(window) = reader.next(source, known.map_or(input.config.window, |w| w.frames as usize))? else {
+            match known {
+                Some(_) => return Err(reader.ended(done)),
+                None => break,
+            }
+        };
+        if let Some(known) = known {
+            reader.skip_done(window.as_ref(), known, done)?;
+            busy += started.elapsed();
+            continue;
+        }
+        let is_short = |window: &Window| (window.frames as usize) < input.config.window;
+        if index > done.first_window && done.windows.get(index - 1).is_some_and(is_short) {
+            return Err(reader.has_grown(done));
+        }
+        let job = Arc::new(reader.prepare(window.as_ref(), index)?);
+        busy += started.elapsed();
+        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < input.config.window {
+            break; // the frames ended, or a later stage failed and reports why
+        }
+    }
+    Ok((busy, reader.findings))
+}
+
+pub(super) struct WindowReader<'a> {
+    config: &'a ConvertConfig,
+    plan: &'a Plan<'a>,
+    /// Buffers for the samples of blocks.
+    idle: &'a Pool<Vec<u8>>,
+    /// The archive of the coded samples.
+    archive: &'a Archive,
+    /// The pixels of a sampled bound.
+    pixels: Vec<Pixel>,
+    /// The range of the frames so far.
+    range: Option<(f64, f64)>,
+    id: Option<FileId>,
+    /// The features of the file.
+    features: Features,
+    /// The result of scanning the samples.
+    findings: Findings,
+    /// The scheme of the window before.
+    scheme: Option<Scheme>,
+    /// The number of frames in the file so far.
+    frames: u64,
+    /// Frames of the file that precede the source's first frame.
+    before: u64,
+}
+
+impl<'a> WindowReader<'a> {
+    pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, done: &WindowsDone, idle: &'a Pool<Vec<u8>>) -> Self {
+        let CodedInput { config, archive, .. } = input;
+        let pixels = match config.bound {
+            Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
+            _ => Vec::new(),
+        };
+        // Without a pyramid, readers of version 1.0 suffice.
+        let plain = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0;
+        let packing = if plain { Packing::Flat } else { Packing::default() };
+        let features = done.features.unwrap_or(Features { packing, described: archive.description.is_some() });
+        let (id, range, scheme) = (done.id, None, None);
+        Self {
+            config,
+            plan,
+            idle,
+            archive,
+            pixels,
+            range,
+            id,
+            features,
+            findings: Findings::default(),
+            scheme,
+            frames: 0,
+            before: 0,
+        }
+    }
+
+    /// The next frames of the source, at most `count`; none at its end.
+    fn next(&self, source: &mut dyn FrameSource, count: usize) -> Result<Option<Box<dyn FrameWindow>>> {
+        let first = self.first();
+        let count = self.archive.frames.map_or(count, |all| count.min(all.saturating_sub(first)));
+        if count == 0 {
+            return Ok(None);
+        }
+        Ok(Some(source.window(first, count)?).filter(|window| window.frames() > 0))
+    }
+
+    /// The error if a source continues after a short last window that was already converted.
+    fn has_grown(&self, done: &WindowsDone) -> Error {
+        let frames = self.frames;
+        let what = format!("the input ended after {frames} frames and has grown");
+        Error::changed(&done.name, Note::with(what, Remedy::AppendOrBeginAnew { frames }))
+    }
+
+    /// The error if a source has fewer frames than before.
+    fn ended(&self, done: &WindowsDone) -> Error {
+        let had: u64 = done.windows.iter().map(|window| u64::from(window.frames)).sum();
+        let what = format!("the input ends after {} frames; {} were converted before", self.frames, had);
+        Error::changed(&done.name, what)
+    }
+
+    /// The number of the source's next frame.
+    fn first(&self) -> usize {
+        (self.frames - self.before) as usize
+    }
+
+    /// Takes over a window's record as if the window had just been coded.
+    fn continue_after(&mut self, window: &Window) {
+        self.range = Some(window.range).filter(|range| range.0 <= range.1 && self.config.range.is_none());
+        self.scheme = Some(Scheme::from_window(window));
+        self.frames += u64::from(window.frames);
+    }
+
+    /// Continues after a window that the file has; an error if its frames differ from the source's.
+    fn skip_done(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
+        let scan = self.scan(window)?;
+        window.check_unchanged()?;
+        if scan.digest != known.digest || window.frames() != known.frames as usize {
+            let (first, end) = (known.first_frame, known.first_frame + u64::from(known.frames));
+            let what =
+                format!("frames {first}..{end} are not those that were converted before into {}", done.name.display());
+            return Err(Error::changed(window.name(0), what));
+        }
+        self.continue_after(known);
+        Ok(())
+    }
+
+    /// The file's id: that of the continued file, or a new one from the first window's digest.
+    fn id(&mut self, digest: u64) -> Result<FileId> {
+        let new =
+            || self.plan.start.file_id(digest, self.features).map_err(|e| Error::setting("settings", e.to_string()));
+        let id = self.id.map_or_else(new, Ok)?;
+        self.id = Some(id);
+        Ok(id)
+    }
+
+    /// Scans the samples of a window as they are read.
+    fn scan(&self, window: &dyn FrameWindow) -> Result<Scan> {
+        let plain = (self.archive.sample, self.config.missing_value);
+        let (ty, missing_value) = self.plan.colour_transform.map_or(plain, |p| (p.sample, p.missing_value));
+        scan(window, &self.archive.grid, ty, missing_value)
+    }
+
+    /// Scans a window and prepares its coding.
+    fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
+        let scan = self.scan(window)?;
+        self.refuse_missing(window, self.first(), &scan)?;
+        self.look_for_fill(window, &scan)?;
+        self.job(window, index, &scan)
+    }
+
+    /// Fixes the error bound of a window and chooses its scheme, from what a scan saw.
+    pub(super) fn job(&mut self, window: &dyn FrameWindow, index: usize, scan: &Scan) -> Result<WindowJob> {
+        let (config, ty, first) = (self.config, self.archive.sample, self.first());
+        let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { scan.range };
+        let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
+        self.range = Some(range);
+        let range = config.range.unwrap_or(range);
+        let coloured = coloured(self.plan, window);
+        let channels: Vec<&dyn FrameWindow> = match &coloured[..] {
+            [] => vec![window],
+            coloured => coloured.iter().map(|channel| channel as _).collect(),
+        };
+        let delta = self.delta(&channels, of_window, range)?;
+        let promise = ErrorBound { bound: config.bound, tolerance: config.tolerance, delta };
+        let magnitude = sample::magnitude(of_window);
+        let before =
+            self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(config.chain) && scheme.pyramid.is_some());
+        let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
+        let scheme = SchemeSelector {
+            config,
+            archive: self.archive,
+            channels: &channels,
+            promise,
+            magnitude,
+            most,
+            packing: self.features.packing,
+            before,
+        };
+        let scheme = scheme.choose()?;
+        self.scheme = Some(scheme.clone());
+        let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edges[0]);
+        codec.missing_value = config.missing_value;
+        codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
+        self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
+        let id = self.id(scan.digest)?;
+        let index =
+            u32::try_from(index).map_err(|_| Error::setting("window", "gives too many windows; take longer ones"))?;
+        let times = self.archive.times_of(first..first + window.frames());
+        let first_frame = self.frames;
+        self.frames += window.frames() as u64;
+        Ok(WindowJob { index, first_frame, id, features: self.features, codec, range, digest: scan.digest, times })
+    }
+
+    /// The delta of a window. `of_window` is the range of its samples, `range` that of all samples up to its end.
+    fn delta(&self, channels: &[&dyn FrameWindow], of_window: (f64, f64), range: (f64, f64)) -> Result<f64> {
+        let ConvertConfig { tolerance, missing_value, .. } = *self.config;
+        let magnitude = sample::magnitude(of_window);
+        match self.config.bound {
+            Bound::Pointwise | Bound::Rms => Ok(bound::range_bound(tolerance, range)),
+            Bound::Relative { floor } => Ok(bound::relative_bound(tolerance, floor, magnitude)),
+            Bound::Sampled { .. } => {
+                let Archive { ref grid, sample, .. } = *self.archive;
+                let of_channel = |window: &&dyn FrameWindow| {
+                    let view = sampled::View { window: *window, grid, sample, missing_value, magnitude };
+                    view.bound(tolerance, &self.pixels)
+                };
+                let deltas = channels.iter().map(of_channel).collect::<Result<Vec<_>>>()?;
+                // A channel that is black everywhere meets every bound, so it does not count.
+                Ok(deltas.into_iter().filter(|delta| *delta > 0.0).reduce(f64::min).unwrap_or(0.0))
+            }
+        }
+    }
+
+    fn refuse_missing(&self, window: &dyn FrameWindow, first: usize, scan: &Scan) -> Result<()> {
+        let (MissingPolicy::Error, Some((frame, voxel))) = (self.config.missing, scan.first_missing) else {
+            return Ok(());
+        };
+        let [x, y, z] = self.archive.grid.whole().voxel(voxel);
+        let what = format!(
+            "frame {} has a missing value (NaN, infinite or as declared) at x {x}, y {y}, z {z}, the first of {} in \
+             frames {first}..{}",
+            first + frame,
+            scan.missing,
+            first + window.frames()
+        );
+        Err(Error::input(window.name(frame), Note::with(what, Remedy::MaskMissing)))
+    }
+
+    /// Notes a value that may mean "missing"; an error if it would leave nothing of the others.
+    fn look_for_fill(&mut self, window: &dyn FrameWindow, scan: &Scan) -> Result<()> {
+        let extreme = scan.extremes.extreme().filter(|_| self.plan.colour_transform.is_none());
+        let Some(extreme) = extreme else { return Ok(()) };
+        let ConvertConfig { bound, tolerance, range, refuse_fill, .. } = *self.config;
+        let of_range = matches!(bound, Bound::Pointwise | Bound::Rms) && range.is_none() && refuse_fill;
+        let range = self.range.map_or(scan.range, |r| join_ranges(r, scan.range));
+        let allowed = of_range.then(|| bound::range_bound(tolerance, range));
+        let samples = (self.archive.grid.whole().voxels() * window.frames()) as u64 - scan.missing;
+        match warnings::fill(&extreme, samples, self.archive.sample, allowed) {
+            Some(Fill::Refuse(note)) => return Err(Error::input(window.name(0), note)),
+            Some(Fill::Warn(note)) => _ = self.findings.fill.get_or_insert(note),
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// Looks at how some voxels of a block vary.
+    fn look_at_variation(&mut self, job: &WindowJob, read: &BlockSamples) {
+        if self.plan.colour_transform.is_some() {
+            return;
+        }
+        let (block, all) = (read.id.block as usize, self.plan.blocks.len());
+        let (extent, ty) = (self.plan.block_with_ghosts(&job.codec, block), self.archive.sample);
+        self.findings.variation.add_block(block, all, &extent, ty, self.config.missing_value, &read.samples);
+    }
+
+    /// Reads and sends the window's blocks. False if the receiver is gone.
+    fn send_blocks(
+        &mut self,
+        window: &dyn FrameWindow,
+        job: &Arc<WindowJob>,
+        out: &Sender<Batch>,
+        busy: &mut Duration,
+    ) -> Result<bool> {
+        let (all, batch) = (self.plan.blocks_of_window(), self.plan.batch);
+        for first in (0..all).step_by(batch) {
+            let started = Instant::now();
+            let blocks: Result<Vec<_>> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
+            let blocks = blocks?;
+            blocks.iter().for_each(|block| self.look_at_variation(job, block));
+            let last = first + batch >= all;
+            if last {
+                window.check_unchanged()?;
+            }
+            let batch = Batch { window: job.clone(), blocks, last };
+            *busy += started.elapsed();
+            if out.send(batch).is_err() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Reads the samples that coding one block takes, frame by frame. Block numbers run through all channels.
+    pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<BlockSamples> {
+        let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
+        let Region { start, .. } = self.plan.blocks.region(block);
+        let known = self.plan.block_with_ghosts(&job.codec, block).known;
+        let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
+        let mut samples = self.idle.take().unwrap_or_default();
+        let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
+        read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;
+        Ok(BlockSamples { id: BlockId { window: job.index, block: block as u32, channel: channel as u16 }, samples })
+    }
+}
+
+/// The colour channels of a window; empty if samples are coded directly.
+fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {
+    let all =
+        |colour_transform| (0..plan.channels()).map(move |channel| ColourWindow { window, colour_transform, channel });
+    plan.colour_transform.into_iter().flat_map(all).collect()
+}

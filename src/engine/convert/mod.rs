@@ -1,0 +1,440 @@
+//! Converts frames to a coefficient file: a reader, workers and a writer, with bounded channels between them.
+//!
+//! ```text
+//! reader thread            workers (rayon)           writer (the caller's thread)
+//! scan a window      ->    encode a batch       ->   append in order, directory, footer
+//! gather its blocks        of blocks                 window by window
+//! ```
+//!
+//! Batches keep their order. So the bytes do not depend on the number of threads, nor on the memory budget, which only
+//! sets the size of a batch. The workers are rayon's global pool. The bound of a window follows from its own samples,
+//! or, if the tolerance refers to the value range, from the range of all frames up to its end. That range never exceeds
+//! the archive's. So conversion needs only one pass over the data, and a pipe gives the same bytes as files.
+//!
+//! A window is completed in the file only after its source was found unchanged; then `out` is flushed. So a killed
+//! conversion leaves a file that is valid up to its last complete window, and [`convert_into`] continues there. Each window's
+//! record holds all that the next window needs, so the resumed file has the same bytes as an uninterrupted one.
+
+mod choose;
+mod coded_input;
+pub mod estimate;
+mod gather;
+mod learn;
+mod max_error;
+mod plan;
+mod pool;
+mod record;
+mod request;
+mod run;
+#[doc(hidden)]
+pub mod sampled;
+mod settings;
+pub mod shard;
+mod smoothness;
+mod to_file;
+mod variation;
+mod warnings;
+
+use crate::file::report::{BoundReport, WindowReport};
+pub use choose::{SchemeConstraint, SpatialPredictor};
+use coded_input::CodedInput;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use gather::{Batch, BlockSamples};
+pub use max_error::MaxError;
+use plan::Plan;
+use pool::Pool;
+use rayon::prelude::*;
+use record::WindowWriter;
+pub use request::ConvertRequest;
+pub use run::{Failure, append, run};
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+pub use to_file::convert_to_file;
+use wavesplat_core::base::description::{Description, is_of};
+use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::memory;
+use wavesplat_core::base::progress::Progress;
+use wavesplat_core::codec::WindowCodec;
+pub use wavesplat_core::codec::bound::{Bound, range_bound};
+use wavesplat_core::codec::encode::{Encoded, Encoder};
+use wavesplat_core::colour::TransferFunction;
+use wavesplat_core::source::{Archive, ColourTransform, FrameSource};
+pub use wavesplat_format::{Basis, Packing, Stencil};
+use wavesplat_format::{BlockId, CompletePrefix, Features, FileId, Window};
+
+/// What to do with NaN, infinities and the declared missing value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MissingPolicy {
+    /// Reject the input; the error names the first one and their number.
+    Error,
+    /// Keep their bits; they add nothing to pictures.
+    Mask,
+}
+
+/// How to convert. [`ConvertConfig::new`] has the defaults; change others by struct update:
+///
+/// ```
+/// use wavesplat::convert::{Bound, ConvertConfig};
+///
+/// let config = ConvertConfig { bound: Bound::Rms, window: 16, ..ConvertConfig::new(0.001) };
+/// ```
+#[derive(Debug, Clone)]
+pub struct ConvertConfig {
+    /// Restricts the choice of scheme. Default: the smallest is found for every window.
+    pub coding: SchemeConstraint,
+    /// Number of consecutive windows that may reuse the previous window's scheme. A shard is a whole number of such
+    /// chains. Default: 8.
+    pub chain: usize,
+    /// Frames in a window: a power of two for [`Basis::Haar`], one more for [`Basis::Multi`]. Default: 32.
+    pub window: usize,
+    /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit.
+    pub tolerance: f64,
+    /// The error allowed in the samples' unit, for a pointwise or rms bound; 0 keeps every bit. It takes the place of
+    /// `tolerance` and `range`; see [`ConvertConfig::with_max_error`]. Default: none.
+    pub max_error: Option<f64>,
+    /// What is promised. Default: no sample is off by more than the tolerance times the value range.
+    pub bound: Bound,
+    /// The value range that a pointwise or rms tolerance refers to. Default: that of the frames so far.
+    pub range: Option<(f64, f64)>,
+    /// What to do with missing samples. Default: refuse them.
+    pub missing: MissingPolicy,
+    /// A value that means "missing", besides NaN and infinities. Default: none.
+    pub missing_value: Option<f64>,
+    /// Refuse a window if its largest or smallest value repeats, probably means "missing", and would make a bound that
+    /// refers to the value range larger than the variation of the other samples. Default: true.
+    pub refuse_fill: bool,
+    /// Clamp extracted samples to the smallest and largest source sample of their window. Default: no.
+    pub clip: bool,
+    /// Colours to convert samples to before they are coded: three channels, 0 to 1. The bound then refers to the
+    /// channels, whose value range is 0 to 1 by default. Default: none.
+    pub colours: Option<TransferFunction>,
+    /// Voxels a side of a block. Default: as many as suit the window.
+    pub block: Option<usize>,
+    /// zstd level, 1 to 19. Default: 3.
+    pub level: i32,
+    /// Bytes that may be allocated. Default: 512 MiB.
+    pub memory: usize,
+    /// Options that selected the input (frames, region, variable), stored so that the same samples can be found again.
+    /// Default: none.
+    pub settings: Vec<(String, String)>,
+}
+
+impl ConvertConfig {
+    /// The defaults, which are those of `wavesplat convert`, with a tolerance: 0.01 allows every sample to be off by 1 % of
+    /// the value range.
+    pub fn new(tolerance: f64) -> Self {
+        Self {
+            coding: SchemeConstraint::AUTO,
+            chain: CHAIN,
+            window: 32,
+            tolerance,
+            max_error: None,
+            bound: Bound::Pointwise,
+            range: None,
+            missing: MissingPolicy::Error,
+            missing_value: None,
+            refuse_fill: true,
+            clip: false,
+            colours: None,
+            block: None,
+            level: 3,
+            memory: memory::DEFAULT,
+            settings: Vec::new(),
+        }
+    }
+
+    /// The defaults, with an error in the samples' unit: 0.1 allows every sample to be off by 0.1.
+    ///
+    /// ```
+    /// use wavesplat::convert::{ConvertConfig, convert_to_file};
+    /// use wavesplat::file::{CoefficientFile, promise::max_error};
+    /// use wavesplat::source::ArraySource;
+    ///
+    /// let kelvin: Vec<f32> = (0..4 * 512).map(|i| 280.0 + (i as f32 / 50.0).sin()).collect();
+    /// let mut source = ArraySource::from_f32([8, 8, 8], &kelvin)?;
+    /// # let folder = tempfile::tempdir().unwrap();
+    /// # let path = folder.path().join("run.wspl");
+    /// let report = convert_to_file(&mut source, &ConvertConfig::with_max_error(0.1), &path)?;
+    /// assert!(report.reached <= 0.1 && report.delta == 0.1);
+    /// assert_eq!(max_error(CoefficientFile::open(&path)?.metadata()), Some(0.1));
+    /// # Ok::<(), wavesplat::Error>(())
+    /// ```
+    pub fn with_max_error(max_error: f64) -> Self {
+        Self { max_error: Some(max_error), ..Self::new(0.0) }
+    }
+}
+
+/// The default of [`ConvertConfig::chain`].
+const CHAIN: usize = 8;
+
+/// The report of a conversion.
+#[derive(Debug, Clone, Serialize)]
+pub struct ConvertReport {
+    /// Frames of the file.
+    pub frames: u64,
+    /// Frames that were in the file before.
+    pub frames_before: u64,
+    /// Windows of the file.
+    pub windows: usize,
+    /// Samples of all frames.
+    pub samples: u64,
+    /// Bytes of the samples of all frames.
+    pub input_bytes: u64,
+    /// Bytes of the coefficient file.
+    pub output_bytes: u64,
+    /// Nonzero coefficients kept.
+    pub coefficients: u64,
+    /// Nonzero coefficients per sample.
+    pub coefficients_per_sample: f64,
+    /// Samples stored exactly because coefficients missed the bound.
+    pub outliers: u64,
+    /// Missing samples.
+    pub missing: u64,
+    /// The error bound.
+    #[serde(flatten)]
+    pub promise: BoundReport,
+    /// The value range that a pointwise or rms tolerance refers to; of an error in the samples' unit, that of the decoded
+    /// samples.
+    pub range: (f64, f64),
+    /// The largest bound in any window.
+    pub delta: f64,
+    /// The largest error reached in any sample.
+    pub reached: f64,
+    /// The largest share of its bound that any series uses.
+    pub share: f64,
+    /// Typical variation over time: the median, over the voxels that change, of the standard deviation within a window.
+    /// Estimated from some voxels of every window converted now. `None` if no voxel changes.
+    pub typical_variation: Option<f64>,
+    /// Warnings, with what to change.
+    #[serde(skip)]
+    pub warnings: Vec<Note>,
+    /// The bound and the errors of each window.
+    pub per_window: Vec<WindowReport>,
+    /// Seconds spent scanning and gathering samples, on the reader's thread.
+    pub read_seconds: f64,
+    /// Seconds of wall time in which the workers encoded.
+    pub encode_seconds: f64,
+    /// Seconds spent writing.
+    pub write_seconds: f64,
+    /// Seconds from start to end.
+    pub seconds: f64,
+    /// Names of arrays beside the samples that are not kept, since appended frames lack them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_kept: Vec<String>,
+}
+
+/// Where a conversion goes on: the complete windows of a file that more frames are added to.
+#[derive(Debug)]
+pub struct ResumePoint {
+    /// The file's complete windows.
+    pub complete: CompletePrefix,
+    /// Number of the window at which the source begins. Earlier windows are not compared with the source.
+    pub first_window: usize,
+    /// The description of the windows before it, if there are any and the file has one.
+    pub description: Option<Description>,
+}
+
+/// The output of a conversion.
+#[derive(Debug)]
+pub struct Target<'a, W> {
+    /// What messages call it.
+    pub name: &'a Path,
+    /// The stream, at the end of the windows that it has already.
+    pub out: W,
+    /// The windows that it has already; `None` begins a file.
+    pub resume_from: Option<ResumePoint>,
+}
+
+/// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without seeking.
+///
+/// `out` is flushed when a window is complete. Messages call it `name`.
+pub fn convert<W: Write>(
+    source: &mut dyn FrameSource,
+    config: &ConvertConfig,
+    name: &Path,
+    out: W,
+    progress: &dyn Progress,
+) -> Result<ConvertReport> {
+    convert_into(source, config, Target { name, out, resume_from: None }, progress)
+}
+
+/// As [`convert`], continuing a partial file after its complete windows if the target has some.
+///
+/// # Errors
+/// Those of [`convert`]; also an error if the partial file has other settings, or was converted from other frames.
+pub fn convert_into<W: Write>(
+    source: &mut dyn FrameSource,
+    config: &ConvertConfig,
+    target: Target<'_, W>,
+    progress: &dyn Progress,
+) -> Result<ConvertReport> {
+    let started = Instant::now();
+    let input = &CodedInput::new(config, source.archive());
+    let plan = Plan::new(input)?;
+    check_description(&input.archive, target.resume_from.as_ref())?;
+    let done = WindowsDone::new(target.resume_from.as_ref(), &plan, &input.archive, target.name)?;
+    let windows = input.archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
+    progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
+    progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
+    let mut writer = WindowWriter::new(input, &plan, target);
+    let (to_workers, from_reader) = bounded(0);
+    let (to_writer, from_workers) = bounded(0);
+    let idle = Pool::default();
+    let ((read, findings), encoding) = std::thread::scope(|scope| {
+        // Each stage owns its ends of the channels. When a stage ends, even by an error, its neighbours end too.
+        let (plan, done, idle) = (&plan, &done, &idle);
+        let reader = scope.spawn(move || gather::read(source, input, plan, done, idle, &to_workers));
+        let workers = scope.spawn(move || encode(config.level, plan, idle, &from_reader, &to_writer));
+        let written = writer.write(from_workers, progress);
+        let (encoded, read) = (join(workers), join(reader));
+        Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
+    })?;
+    let report = writer.finish(started, read, &findings, encoding)?;
+    progress.finish();
+    Ok(report)
+}
+
+/// Checks that the source's description fits its frames, so that a mismatch fails at the start and not at the end.
+fn check_description(archive: &Archive, resume_from: Option<&ResumePoint>) -> Result<()> {
+    let is_appended = resume_from.is_some_and(|point| point.first_window > 0);
+    let fits = |description: &Description| {
+        is_appended || archive.frames.is_some_and(|frames| is_of(description, archive.grid.dims, frames))
+    };
+    match archive.description.as_ref().is_none_or(fits) {
+        true => Ok(()),
+        false => Err(Error::setting("description", "its axes are not those of the frames")),
+    }
+}
+
+/// Propagates the panic of a stage, which is a bug and not an error.
+fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
+    stage.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// The windows that a file already has, and their relation to the source's frames.
+#[derive(Debug, Default)]
+struct WindowsDone {
+    id: Option<FileId>,
+    /// Those of the file that is continued.
+    features: Option<Features>,
+    windows: Vec<Window>,
+    /// [`ResumePoint::first_window`]
+    first_window: usize,
+    name: PathBuf,
+}
+
+impl WindowsDone {
+    fn new(resume_from: Option<&ResumePoint>, plan: &Plan<'_>, archive: &Archive, name: &Path) -> Result<Self> {
+        let Some(ResumePoint { complete, first_window, .. }) = resume_from else { return Ok(Self::default()) };
+        let held = complete.metadata();
+        if let Some(what) = settings::difference(&held.start(), &plan.start, *first_window == 0) {
+            return Err(Error::path(name, format!("was begun with another {what}")));
+        }
+        if *first_window == 0 && held.start() != plan.start {
+            return Err(Error::path(name, "was begun with other settings"));
+        }
+        let first = held.windows.get(*first_window).map_or(held.frames, |window| window.first_frame);
+        if !archive.begins_with_times(held.times.get(first as usize..).unwrap_or_default()) {
+            return Err(Error::path(name, "was begun with other times"));
+        }
+        Ok(Self {
+            id: Some(complete.id()),
+            features: Some(complete.features()),
+            windows: held.windows.clone(),
+            first_window: *first_window,
+            name: name.into(),
+        })
+    }
+}
+
+/// The worker stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
+fn encode(
+    level: i32,
+    plan: &Plan<'_>,
+    read: &Pool<Vec<u8>>,
+    batches: &Receiver<Batch>,
+    out: &Sender<EncodedBatch>,
+) -> Result<Duration> {
+    let encoders = Encoders::default();
+    let mut busy = Duration::ZERO;
+    for batch in batches {
+        let started = Instant::now();
+        let encoded = encode_batch(level, plan, &encoders, read, batch)?;
+        busy += started.elapsed();
+        if out.send(encoded).is_err() {
+            break; // the writer failed and reports why
+        }
+    }
+    Ok(busy)
+}
+
+type Encoders = Pool<Encoder>;
+
+/// Encodes a batch on all workers.
+fn encode_batch(
+    level: i32,
+    plan: &Plan<'_>,
+    encoders: &Encoders,
+    read: &Pool<Vec<u8>>,
+    Batch { window, blocks, last }: Batch,
+) -> Result<EncodedBatch> {
+    let encode = |BlockSamples { id, samples }| {
+        let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+        let extent = plan.block_with_ghosts(&window.codec, id.block as usize);
+        let samples = to_channel(plan.colour_transform, id, samples, read);
+        let encoded = encoder.block(&window.codec, id, extent, &samples).map_err(bug);
+        encoders.put(encoder);
+        read.put(samples);
+        encoded
+    };
+    let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
+    Ok(EncodedBatch { window: window.clone(), blocks: blocks?, last })
+}
+
+/// Converts the samples of a block to those of its channel.
+fn to_channel(
+    colour_transform: Option<&ColourTransform>,
+    id: BlockId,
+    samples: Vec<u8>,
+    idle: &Pool<Vec<u8>>,
+) -> Vec<u8> {
+    let Some(colour_transform) = colour_transform else { return samples };
+    let mut channel = idle.take().unwrap_or_default();
+    channel.resize(samples.len() / colour_transform.sample.size() * ColourTransform::SAMPLE.size(), 0);
+    colour_transform.paint(id.channel.into(), &samples, &mut channel);
+    idle.put(samples);
+    channel
+}
+
+/// An error for compression failures, which happen only if a size exceeds our own limits.
+fn bug(error: wavesplat_format::Error) -> Error {
+    Error::CoefficientFile { path: "encoding".into(), source: error }
+}
+
+/// Coded blocks for the writer, in order.
+#[derive(Debug)]
+struct EncodedBatch {
+    window: Arc<WindowJob>,
+    blocks: Vec<Encoded>,
+    last: bool,
+}
+
+/// A window, as the reader prepared it.
+#[derive(Debug)]
+struct WindowJob {
+    index: u32,
+    first_frame: u64,
+    id: FileId,
+    /// How the file's codes are packed, and whether it has a description.
+    features: Features,
+    codec: WindowCodec,
+    /// The range that the tolerance refers to: the given one, or that of all samples up to the window's end.
+    range: (f64, f64),
+    digest: u64,
+    /// The times of its frames, if the source has any.
+    times: Vec<f64>,
+}

@@ -1,0 +1,193 @@
+//! Decisions made from the configuration and the archive before any frame is read.
+
+use super::coded_input::CodedInput;
+use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
+use crate::file::promise::UNIT_RANGE;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::grid::BlockGrid;
+use wavesplat_core::base::memory;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
+use wavesplat_core::codec::bound::Bound;
+use wavesplat_core::source::{CHANNELS, ColourTransform};
+use wavesplat_core::wavelet;
+use wavesplat_format::{Basis, Metadata};
+
+/// Decisions made from the configuration and the archive before any frame is read.
+#[derive(Debug)]
+pub(super) struct Plan<'a> {
+    /// Converts samples to channels, if there are several.
+    pub(super) colour_transform: Option<&'a ColourTransform>,
+    /// The metadata before the first frame.
+    pub(super) start: Metadata,
+    pub(super) blocks: BlockGrid,
+    /// Blocks that are gathered, encoded and written together.
+    pub(super) batch: usize,
+}
+
+/// The default block edge in voxels. Without a pyramid at most 32, less for long windows, so that a block stays near 4
+/// MiB. With a pyramid up to 48, because larger blocks compress better, even beside small ones at the far faces; and a
+/// multiple of 16 allows coarse lattices.
+fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usize {
+    let (largest, samples) =
+        if coding.space == SpatialPredictor::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
+    let fits = |e: &usize| e * e * e * window <= samples;
+    let edge = [largest, largest / 2, largest / 4, 4, 2].into_iter().find(fits).unwrap_or(1);
+    let longest = dims.into_iter().max().unwrap_or(1);
+    if coding.space == SpatialPredictor::Alone { edge } else { longest.min(edge) }
+}
+
+impl<'a> Plan<'a> {
+    /// Whether blocks may have `edge` voxels a side.
+    fn takes(config: &ConvertConfig, edge: usize) -> bool {
+        let coefficients = most_coefficients(config) as u64;
+        edge > 0
+            && (edge as u64).saturating_pow(3).saturating_mul(coefficients)
+                <= wavesplat_format::limits::MAX_BLOCK_SAMPLES
+    }
+
+    /// A block, with the voxels around it that help to code it.
+    pub(super) fn block_with_ghosts(&self, codec: &WindowCodec, block: usize) -> BlockWithGhosts {
+        let region = self.blocks.region(block);
+        let (start, size) = (region.start, region.dims());
+        let outer = codec.outer_size(size);
+        BlockWithGhosts {
+            size,
+            known: std::array::from_fn(|a| (start[a] + outer[a]).min(self.blocks.dims[a]) - start[a]),
+        }
+    }
+
+    pub(super) fn new(input: &'a CodedInput) -> Result<Self> {
+        let CodedInput { config, archive, colour_transform } = input;
+        wavelet::check_window(config.coding.basis.unwrap_or(Basis::Samples), config.window)?;
+        check_bound(input)?;
+        if config.chain == 0 {
+            return Err(Error::setting("chain", "takes 1 or more windows"));
+        }
+        let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
+        let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
+        if !Self::takes(config, edge) {
+            return Err(Error::setting(
+                "block",
+                format!("holds 1 to {most} samples over a window, not {edge} voxels a side"),
+            ));
+        }
+        let blocks = BlockGrid::cubes(archive.grid.dims, edge);
+        if u32::try_from(blocks.len()).is_err() {
+            return Err(Error::setting(
+                "block",
+                format!("{edge} voxels a side give more than 2^32 blocks; take larger ones"),
+            ));
+        }
+        let batch = batch_len(input, blocks)?;
+        Ok(Self { start: start(input, edge), colour_transform: colour_transform.as_ref(), blocks, batch })
+    }
+
+    /// The plan of a file that has `count` blocks, side by side.
+    pub(super) fn for_blocks(&self, count: usize) -> Self {
+        let edge = self.blocks.edges[0];
+        let blocks = BlockGrid::cubes([edge * count, edge, edge], edge);
+        let start = Metadata { dims: blocks.dims.map(|n| n as u64), ..self.start.clone() };
+        Self { start, blocks, ..*self }
+    }
+
+    pub(super) fn channels(&self) -> usize {
+        self.start.channels.into()
+    }
+
+    pub(super) fn blocks_of_window(&self) -> usize {
+        self.blocks.len() * self.channels()
+    }
+}
+
+/// Checks that the tolerance or error is valid for this bound and these samples.
+fn check_bound(input: &CodedInput) -> Result<()> {
+    let config = &input.config;
+    let Some(error) = config.max_error else {
+        let is_share = (0.0..=1.0).contains(&config.tolerance);
+        return is_share.then_some(()).ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
+    };
+    if !(0.0..=f64::MAX).contains(&error) {
+        return Err(Error::setting("max_error", "takes a finite number of 0 or more, in the samples' unit"));
+    }
+    check_max_error(config.bound, config.range != Some(UNIT_RANGE), input.colour_transform.is_some())
+}
+
+/// Checks that an error in the samples' unit means something beside the other settings.
+pub(super) fn check_max_error(bound: Bound, has_range: bool, has_colours: bool) -> Result<()> {
+    let (setting, what) = match bound {
+        _ if has_colours => ("max_error", "is in the samples' unit, and `transfer_function` codes colours"),
+        _ if has_range => ("range", "the tolerance refers to it, and `max_error` to no range; give one"),
+        Bound::Relative { .. } | Bound::Sampled { .. } => {
+            ("max_error", "needs `bound` pointwise or rms; the others are shares of the samples themselves")
+        }
+        Bound::Pointwise | Bound::Rms => return Ok(()),
+    };
+    Err(Error::setting(setting, what))
+}
+
+/// The metadata before the first frame.
+fn start(input: &CodedInput, edge: usize) -> Metadata {
+    let CodedInput { config, archive, colour_transform } = input;
+    Metadata {
+        dims: archive.grid.dims.map(|n| n as u64),
+        spacing: archive.grid.spacing,
+        origin: archive.grid.origin,
+        sample: archive.sample,
+        block_edge: edge as u32,
+        channels: colour_transform.as_ref().map_or(1, |_| CHANNELS.len() as u16),
+        frames: 0,
+        times: Vec::new(),
+        variable: archive.variable.clone(),
+        bound: config.bound,
+        tolerance: config.tolerance,
+        missing_value: config.missing_value,
+        windows: Vec::new(),
+        settings: settings::stored_settings(input),
+        program: format!("wavesplat {}", env!("CARGO_PKG_VERSION")),
+    }
+}
+
+/// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
+/// workers' scratch, and what choosing the next window's scheme takes.
+fn batch_len(input: &CodedInput, blocks: BlockGrid) -> Result<usize> {
+    let CodedInput { config, archive, colour_transform } = input;
+    let sample = archive.sample;
+    let voxels = blocks.region(0).voxels();
+    let samples = voxels * config.window;
+    let largest = |transform: &ColourTransform| transform.sample.size().max(sample.size());
+    let raw = samples * colour_transform.as_ref().map_or(sample.size(), largest);
+    let channel_bytes = colour_transform.as_ref().map_or(0, |_| samples * sample.size());
+    let codes = voxels * most_coefficients(config) * size_of::<i32>();
+    let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // no pyramid is tried then
+    let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
+    let choice = if alone { 0 } else { choose::bytes(samples, sample) };
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + ZSTD_SCRATCH;
+    let needs =
+        |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + choice + memory::FIXED;
+    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // recent memory is cached
+    let fits = (1..=enough).rev().find(|batch| needs(batch) + archive.memory <= config.memory);
+    fits.ok_or_else(|| {
+        let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
+        let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edges[0]);
+        let window = config.window;
+        let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
+        Error::setting(
+            "memory",
+            Note::with(format!("{what}; give that, or make either smaller"), Remedy::Adjust(&["window", "block"])),
+        )
+    })
+}
+
+/// The number of coefficients of a voxel in a full window.
+fn most_coefficients(config: &ConvertConfig) -> usize {
+    match config.coding.basis {
+        Some(basis @ (Basis::Haar | Basis::Multi)) => wavelet::basis(basis, &[], config.window).coefficients(),
+        // as many as frames; without a given basis, one of these two is chosen
+        Some(Basis::Samples | Basis::Learned) | None => config.window,
+    }
+}
+
+/// An upper bound of the memory of a zstd context at the offered levels, for inputs of a few MiB.
+const ZSTD_SCRATCH: usize = 4 << 20;
+const MIB: f64 = 1_048_576.0;

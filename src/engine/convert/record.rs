@@ -1,0 +1,193 @@
+//! The writer stage: appends coded blocks to the file, and sums up each window.
+
+use super::coded_input::CodedInput;
+use super::warnings::{self, Findings};
+use super::{ConvertConfig, ConvertReport, EncodedBatch, Plan, ResumePoint, Target, WindowJob};
+use crate::file::promise::range_of_shares;
+use crate::file::report::{BoundReport, WindowReport};
+use crossbeam_channel::Receiver;
+use std::io::Write;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use wavesplat_core::base::description::{Description, extended, frames_of, joined, with_frames};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::progress::Progress;
+use wavesplat_core::source::Archive;
+use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
+
+pub(super) struct WindowWriter<'a, W: Write> {
+    name: &'a Path,
+    config: &'a ConvertConfig,
+    plan: &'a Plan<'a>,
+    /// The file's writer, created when the first window gives the file its id.
+    writer: Option<Writer<W>>,
+    out: Option<W>,
+    /// The descriptions to store; empty once the file is finished.
+    descriptions: Descriptions,
+    /// The sums over the blocks of the current window so far.
+    window: Option<WindowEnd>,
+    frames_before: u64,
+    busy: Duration,
+}
+
+/// The description of the frames already in the file, and that of the added frames.
+#[derive(Default)]
+struct Descriptions {
+    before: Option<Description>,
+    added: Option<Description>,
+}
+
+impl Descriptions {
+    fn new(archive: &Archive, resume_from: Option<&ResumePoint>) -> Self {
+        let before = resume_from.and_then(|point| point.description.clone());
+        let is_told = resume_from.is_none_or(|point| point.complete.features().described);
+        Self { before, added: archive.description.clone().filter(|_| is_told) }
+    }
+
+    /// The description of the whole file, and the names of the variables left out because some frames lack them.
+    fn joined(self, frames: u64) -> (Option<Description>, Vec<String>) {
+        let (Some(before), added) = (self.before, self.added.as_ref()) else { return (self.added, Vec::new()) };
+        let before = with_frames(before, 1); // if there is no axis of frames, there is one
+        let added = added.map(|added| joined(before.clone(), &[with_frames(added.clone(), 1)]));
+        let is_whole =
+            |(all, _): &(Description, _)| frames_of(all).is_some_and(|d| all.dimensions[d as usize].length == frames);
+        let (all, not_kept) = added.filter(is_whole).unwrap_or_else(|| extended(before, frames));
+        (Some(all), not_kept)
+    }
+}
+
+impl<'a, W: Write> WindowWriter<'a, W> {
+    pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, target: Target<'a, W>) -> Self {
+        let (config, Target { name, out, resume_from }) = (&input.config, target);
+        let descriptions = Descriptions::new(&input.archive, resume_from.as_ref());
+        let frames_before = resume_from.as_ref().map_or(0, |point| point.complete.metadata().frames);
+        let (writer, out) = match resume_from {
+            Some(point) => (Some(Writer::resume(out, point.complete)), None),
+            None => (None, Some(out)),
+        };
+        Self { name, config, plan, writer, out, descriptions, window: None, frames_before, busy: Duration::ZERO }
+    }
+
+    /// Appends batches until the workers end.
+    pub(super) fn write(&mut self, batches: Receiver<EncodedBatch>, progress: &dyn Progress) -> Result<()> {
+        for batch in batches {
+            let started = Instant::now();
+            progress.check()?;
+            self.append(&batch)?;
+            progress.advance(batch.blocks.len() as u64);
+            self.busy += started.elapsed();
+        }
+        Ok(())
+    }
+
+    /// Appends a batch; after the last of a window, the window's end.
+    pub(super) fn append(&mut self, batch: &EncodedBatch) -> Result<()> {
+        let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
+        if let Some(out) = self.out.take() {
+            self.writer = Some(
+                Writer::with_features(out, batch.window.id, &self.plan.start, batch.window.features).map_err(failed)?,
+            );
+        }
+        let writer = self.writer.as_mut().expect("created with the first batch");
+        if self.window.is_none() {
+            writer.begin_window(window_record(&batch.window)).map_err(failed)?;
+        }
+        let window = self.window.get_or_insert(WindowEnd::empty(batch.window.index));
+        for encoded in &batch.blocks {
+            window.add(&encoded.block);
+            window.share = window.share.max(encoded.share);
+            writer.append(&encoded.block).map_err(failed)?;
+        }
+        if let Some(window) = self.window.take_if(|_| batch.last) {
+            writer.end_window(&window).map_err(failed)?;
+            writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;
+        }
+        Ok(())
+    }
+
+    /// Completes the file and returns the report.
+    pub(super) fn finish(
+        mut self,
+        started: Instant,
+        read: Duration,
+        findings: &Findings,
+        encode: Duration,
+    ) -> Result<ConvertReport> {
+        let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
+        let Some(writer) = self.writer.take() else {
+            return Err(Error::input(self.name, "nothing to convert: the input has no frames"));
+        };
+        let last = Instant::now();
+        let metadata = writer.metadata().clone();
+        let (description, not_kept) = std::mem::take(&mut self.descriptions).joined(metadata.frames);
+        let (mut out, summary) = writer.finish_described(description.as_ref()).map_err(failed)?;
+        out.flush().map_err(|e| Error::io(self.name, "writing", e))?;
+        self.busy += last.elapsed();
+        let report = self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]);
+        let warnings = warnings::warnings(self.config, &report, findings);
+        Ok(ConvertReport { typical_variation: findings.variation.median(), warnings, not_kept, ..report })
+    }
+
+    fn report(&self, metadata: &Metadata, output_bytes: u64, seconds: [Duration; 4]) -> ConvertReport {
+        let (Metadata { dims, frames, windows, .. }, range) = (metadata, range_of_shares(metadata));
+        let voxels = dims.iter().product::<u64>();
+        let (samples, voxels) = (voxels * frames, voxels * u64::from(metadata.channels));
+        let of_source = self.plan.colour_transform.map_or(metadata.sample, |colour_transform| colour_transform.sample);
+        let sum = |part: fn(&Window) -> u64| windows.iter().map(part).sum::<u64>();
+        let largest = |part: fn(&Window) -> f64| windows.iter().map(part).fold(0.0, f64::max);
+        let [read_seconds, encode_seconds, write_seconds, seconds] = seconds.map(|d| d.as_secs_f64());
+        ConvertReport {
+            frames: *frames,
+            frames_before: self.frames_before,
+            windows: windows.len(),
+            samples,
+            input_bytes: samples * of_source.size() as u64,
+            output_bytes,
+            coefficients: sum(|w| w.coded),
+            coefficients_per_sample: sum(|w| w.coded) as f64 / samples as f64,
+            outliers: sum(|w| w.outliers),
+            missing: sum(|w| w.missing),
+            promise: BoundReport::from_metadata(metadata),
+            range,
+            delta: largest(|w| w.delta),
+            reached: largest(|w| w.reached),
+            share: largest(|w| w.share),
+            typical_variation: None,
+            warnings: Vec::new(),
+            per_window: windows.iter().map(|w| WindowReport::new(w, voxels)).collect(),
+            read_seconds,
+            encode_seconds,
+            write_seconds,
+            seconds,
+            not_kept: Vec::new(),
+        }
+    }
+}
+
+/// The record that begins a window.
+fn window_record(job: &WindowJob) -> WindowRecord {
+    let (scheme, WindowEnd { number, reached, share, squared_error, min, max, missing, coded, outliers }) =
+        (&job.codec.scheme, WindowEnd::empty(job.index));
+    let window = Window {
+        first_frame: job.first_frame,
+        frames: job.codec.frames() as u32,
+        basis: scheme.basis,
+        coefficients: job.codec.basis.coefficients() as u32,
+        levels: job.codec.levels.iter().map(|r| r.len() as u32).collect(),
+        functions: scheme.functions.clone(),
+        pyramid: scheme.pyramid.clone(),
+        coarseness: scheme.coarseness,
+        range: job.range,
+        digest: job.digest,
+        delta: job.codec.bound.delta,
+        reached,
+        share,
+        squared_error,
+        min,
+        max,
+        missing,
+        coded,
+        outliers,
+    };
+    WindowRecord { number, window, times: job.times.clone() }
+}

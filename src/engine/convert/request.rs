@@ -1,0 +1,245 @@
+//! The request for a conversion, in the words of the programs' options and of Python's arguments.
+
+use super::plan::check_max_error;
+use super::shard::{ArchiveScan, Shard, sharded};
+use super::{CHAIN, ConvertConfig, MaxError, MissingPolicy, SchemeConstraint, SpatialPredictor, settings};
+use serde::{Deserialize, Deserializer, de::Error as _};
+use std::path::PathBuf;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::memory;
+use wavesplat_core::colour::TransferFunction;
+use wavesplat_core::source::{Archive, FrameSource};
+use wavesplat_format::{Basis, Bound};
+
+/// The request for a conversion. [`run`](super::run()) completes it from the frames.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConvertRequest {
+    /// The error allowed, as a share of what the bound refers to, 0 to 1; 0 keeps every bit. Default: 0.01.
+    #[serde(deserialize_with = "number")]
+    pub tolerance: Option<f64>,
+    /// Instead of `tolerance`: the error allowed in the samples' unit, for a pointwise or rms bound; 0 keeps every bit.
+    pub max_error: Option<MaxError>,
+    /// What is promised. Default: pointwise.
+    #[serde(with = "BoundWords")]
+    pub bound: Bound,
+    /// The value range that a pointwise or rms tolerance refers to. Default: that of the frames so far.
+    pub range: Option<(f64, f64)>,
+    /// What to do with missing samples. Default: mask them if a value means "missing", by `missing_value` or by what the
+    /// source declares; else refuse them.
+    pub missing: Option<MissingPolicy>,
+    /// A value that means "missing", besides NaN and infinities. Default: the one that the source declares.
+    #[serde(deserialize_with = "number")]
+    pub missing_value: Option<f64>,
+    /// Clamp extracted samples to the smallest and largest source sample of their window. Default: no.
+    pub clip: bool,
+    /// Colours to convert samples to, over a range of values. In JSON, the text that files keep. Default: none.
+    #[serde(deserialize_with = "colours")]
+    pub transfer_function: Option<TransferFunction>,
+    /// The transform along time: haar, multi, learned, pyramid or auto. Default: auto, the smallest.
+    #[serde(deserialize_with = "settings::basis")]
+    pub basis: Option<Basis>,
+    /// Prediction in space: none, linear, cubic or auto. Default: what suits the basis.
+    #[serde(deserialize_with = "settings::space")]
+    pub space: Option<SpatialPredictor>,
+    /// Frames in a window. Default: 32, and 33 for the basis multi.
+    pub window: Option<usize>,
+    /// Voxels a side of a block. Default: as many as suit the window.
+    pub block: Option<usize>,
+    /// zstd level, 1 to 19. Default: 3.
+    pub level: i32,
+    /// Number of consecutive windows that may reuse the previous window's scheme. Default: 8.
+    pub chain: usize,
+    /// Convert only this shard; in JSON `I/N`. Default: all frames.
+    pub shard: Option<Shard>,
+    /// The file of an [`ArchiveScan`]: it gives `range`. Default: none.
+    pub scan: Option<PathBuf>,
+    /// Bytes that may be allocated. Default: 512 MiB.
+    pub memory: usize,
+    /// Names and values of the options that opened and narrowed the source, which the file keeps. Default: none.
+    pub input: Vec<(String, String)>,
+}
+
+impl Default for ConvertRequest {
+    fn default() -> Self {
+        Self {
+            tolerance: None,
+            max_error: None,
+            bound: Bound::Pointwise,
+            range: None,
+            missing: None,
+            missing_value: None,
+            clip: false,
+            transfer_function: None,
+            basis: None,
+            space: None,
+            window: None,
+            block: None,
+            level: 3,
+            chain: CHAIN,
+            shard: None,
+            scan: None,
+            memory: memory::DEFAULT,
+            input: Vec::new(),
+        }
+    }
+}
+
+/// The default tolerance.
+const TOLERANCE: f64 = 0.01;
+
+impl ConvertRequest {
+    /// Checks the settings without the frames: some contradict each other.
+    ///
+    /// # Errors
+    /// [`Error::Setting`]; other fields that its text names are in backquotes.
+    pub fn check(&self) -> Result<()> {
+        let (has_range, is_exact) = (self.range.is_some(), self.max_error.is_some());
+        let of_range = matches!(self.bound, Bound::Pointwise | Bound::Rms);
+        let knows_range = has_range || self.scan.is_some() || is_exact;
+        if is_exact && self.tolerance.is_some() {
+            let what = "is a share of a range, and `max_error` is in the samples' unit; give one";
+            return Err(Error::setting("tolerance", what));
+        }
+        if is_exact {
+            check_max_error(self.bound, has_range, self.transfer_function.is_some())?;
+        }
+        let (setting, what) = match (&self.scan, self.shard) {
+            _ if self.range.is_some_and(|(lo, hi)| lo > hi) => ("range", "give the lower end first"),
+            (Some(_), _) if has_range || is_exact => {
+                ("scan", "gives the range that a tolerance refers to; leave `range` and `max_error` out")
+            }
+            (Some(_), _) if !of_range => ("scan", "needs `bound` pointwise or rms"),
+            (None, Some(_)) if !of_range && !has_range => ("shard", "needs `bound` pointwise or rms"),
+            (_, Some(_)) if !knows_range => (
+                "shard",
+                "the tolerance refers to the range of all frames, which a shard does not know: give `scan`, `range` or \
+                 `max_error`",
+            ),
+            _ => return Ok(()),
+        };
+        Err(Error::setting(setting, what))
+    }
+
+    /// The frames to convert, which are those of the shard, and the configuration that suits them.
+    pub(super) fn prepare(&self, source: Box<dyn FrameSource>) -> Result<(Box<dyn FrameSource>, ConvertConfig)> {
+        self.check()?;
+        let mut config = self.config(source.archive())?;
+        if let Some(path) = &self.scan {
+            let range = ArchiveScan::open(path)?.range_of(source.archive());
+            config.range = Some(range.map_err(|what| Error::input(path, what))?);
+        }
+        let Some(shard) = self.shard else { return Ok((source, config)) };
+        let (source, of_shard) = sharded(source, shard, config.window, config.chain)?;
+        config.settings.extend(of_shard);
+        Ok((source, config))
+    }
+
+    /// This request, completed from an archive's description.
+    fn config(&self, archive: &Archive) -> Result<ConvertConfig> {
+        let is_declared = archive.missing.is_some() || self.missing_value.is_some();
+        let missing = if is_declared { MissingPolicy::Mask } else { MissingPolicy::Error };
+        let of_variable = |error: &MaxError| error.for_variable(archive.variable.as_deref());
+        let defaults = ConvertConfig::new(self.tolerance.unwrap_or(TOLERANCE));
+        Ok(ConvertConfig {
+            coding: self.coding(),
+            chain: self.chain,
+            window: self.window.unwrap_or(defaults.window + usize::from(self.basis == Some(Basis::Multi))),
+            max_error: self.max_error.as_ref().map(of_variable).transpose()?,
+            bound: self.bound,
+            range: self.range,
+            missing: self.missing.unwrap_or(missing),
+            missing_value: archive.missing_value(self.missing_value),
+            clip: self.clip,
+            colours: self.transfer_function.clone(),
+            block: self.block,
+            level: self.level,
+            memory: self.memory,
+            settings: self.input.clone(),
+            ..defaults
+        })
+    }
+
+    fn coding(&self) -> SchemeConstraint {
+        let suitable = self.basis.map_or(SchemeConstraint::AUTO, SchemeConstraint::from);
+        SchemeConstraint { space: self.space.unwrap_or(suitable.space), ..suitable }
+    }
+}
+
+/// The words of a [`Bound`].
+#[derive(Deserialize)]
+#[serde(remote = "Bound", rename_all = "lowercase", deny_unknown_fields)]
+enum BoundWords {
+    Pointwise,
+    Rms,
+    Relative { floor: f64 },
+    Sampled { samples: u32, seed: u64 },
+}
+
+/// Reads a number, or the text of one: JSON has no NaN.
+fn number<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Option<f64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Number {
+        Plain(f64),
+        Text(String),
+    }
+    match Option::deserialize(from)? {
+        Some(Number::Plain(number)) => Ok(Some(number)),
+        Some(Number::Text(text)) => text.parse().map(Some).map_err(D::Error::custom),
+        None => Ok(None),
+    }
+}
+
+/// Reads colours from the text that files keep.
+fn colours<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Option<TransferFunction>, D::Error> {
+    let Some(text) = Option::<String>::deserialize(from)? else { return Ok(None) };
+    TransferFunction::parse(&text).map(Some).ok_or_else(|| D::Error::custom(format!("no colours: {text}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(json: &str) -> std::result::Result<ConvertRequest, String> {
+        serde_json::from_str(json).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_request_is_read_from_json() {
+        let json = r#"{"bound": {"relative": {"floor": 0.5}}, "range": [-1, 2], "missing": "mask", "basis": "multi",
+            "space": "cubic", "shard": "2/3", "max_error": [["u", 0.1]], "transfer_function": "viridis 0 2",
+            "missing_value": "nan", "tolerance": null}"#;
+        let found = read(json).expect("a request");
+        assert_eq!((found.bound, found.range), (Bound::Relative { floor: 0.5 }, Some((-1.0, 2.0))));
+        assert_eq!((found.missing, found.basis), (Some(MissingPolicy::Mask), Some(Basis::Multi)));
+        assert_eq!((found.shard, found.level), (Some(Shard { number: 2, of: 3 }), 3));
+        assert_eq!(found.max_error, Some(MaxError::Named(vec![("u".into(), 0.1)])));
+        assert_eq!(found.transfer_function.map(|colours| colours.range()), Some((0.0, 2.0)));
+        assert!(found.missing_value.is_some_and(f64::is_nan) && found.tolerance.is_none());
+        assert_eq!(read("{}").expect("a request"), ConvertRequest::default());
+        for wrong in [r#"{"tolerence": 1}"#, r#"{"shard": "3/2"}"#, r#"{"basis": "fourier"}"#, r#"{"bound": "best"}"#] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn contradictions_are_named() {
+        for (json, setting, words) in [
+            (r#"{"tolerance": 0.1, "max_error": 0.1}"#, "tolerance", "give one"),
+            (r#"{"range": [0, 1], "max_error": 0.1}"#, "range", "give one"),
+            (r#"{"range": [1, 0]}"#, "range", "lower end first"),
+            (r#"{"scan": "a.json", "range": [0, 1]}"#, "scan", "leave `range`"),
+            (r#"{"scan": "a.json", "bound": {"relative": {"floor": 0}}}"#, "scan", "needs `bound`"),
+            (r#"{"shard": "1/2", "bound": {"relative": {"floor": 0}}}"#, "shard", "needs `bound`"),
+            (r#"{"shard": "1/2"}"#, "shard", "range of all frames"),
+        ] {
+            let error = read(json).expect("a request").check().expect_err(json);
+            assert!(error.to_string().starts_with(setting) && error.to_string().contains(words), "{json}: {error}");
+        }
+        for fine in [r#"{"shard": "1/2", "range": [0, 1], "bound": {"relative": {"floor": 0}}}"#, r#"{"max_error": 0}"#]
+        {
+            assert!(read(fine).expect("a request").check().is_ok(), "{fine}");
+        }
+    }
+}

@@ -1,0 +1,477 @@
+//! An open coefficient file: the format's reader over any storage, in this library's terms.
+
+use crate::file::counted::Counted;
+use crate::file::decoded::DecodedBlocks;
+use crate::file::detail;
+use crate::file::fetch::BLOCKS_TOGETHER;
+use crate::file::promise;
+use crate::remote::{self, RemoteOptions};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use wavesplat_core::base::address::{is_address, public_name};
+use wavesplat_core::base::description::Description;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
+use wavesplat_core::base::mapped::{Access, FileBytes, State};
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::base::time_labels::TimeLabels;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::coarse;
+use wavesplat_core::codec::decode::Block;
+use wavesplat_core::source::{CHANNELS, ColourTransform};
+use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage};
+
+/// An open coefficient file; several threads may read it. Clones share what is open.
+#[derive(Debug, Clone)]
+pub struct CoefficientFile {
+    path: PathBuf,
+    pub(super) reader: Arc<Reader<Counted>>,
+    /// The state of a local file when it was opened.
+    state: Option<State>,
+    /// The lattice.
+    pub grid: Grid,
+    /// How it is cut into blocks.
+    pub blocks: BlockGrid,
+    /// The level of detail: the lattice has every 2^lod-th voxel along each axis.
+    pub(super) lod: u32,
+    /// The factor by which heights are multiplied.
+    exaggeration: f64,
+    /// What made samples into channels, if there are several.
+    colour_transform: Option<ColourTransform>,
+    /// Damaged blocks that are taken for missing samples, if they are.
+    skipped: Option<Arc<Damage>>,
+    /// Decoded blocks that are kept, if there is room for some.
+    pub(super) kept: Option<Arc<DecodedBlocks>>,
+}
+
+/// The damage to a file, block by block.
+#[derive(Debug, Default)]
+struct Damage {
+    blocks: BTreeMap<BlockId, String>,
+    /// The damaged blocks that were asked for.
+    met: Mutex<BTreeSet<BlockId>>,
+}
+
+impl Damage {
+    /// The number of damaged blocks that were asked for, and the problem of the first; `None` if all blocks that were
+    /// asked for are whole.
+    fn words(&self) -> Option<String> {
+        let met = self.met.lock().unwrap_or_else(PoisonError::into_inner);
+        let first = self.blocks.get(met.first()?)?;
+        Some(format!("{} damaged blocks were left out; the first: {first}", met.len()))
+    }
+
+    fn is_in_window(&self, window: u32) -> bool {
+        let first = BlockId { window, block: 0, channel: 0 };
+        self.blocks.range(first..).next().is_some_and(|(id, _)| id.window == window)
+    }
+}
+
+impl CoefficientFile {
+    /// Opens a local file through a memory map.
+    ///
+    /// Checks header, footer, metadata and directory, but not the blocks.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the file cannot be read, [`Error::CoefficientFile`] if it is damaged, unfinished or no coefficient
+    /// file.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_with(path, Access::Map)
+    }
+
+    /// As [`Self::open`], with a choice between a memory map and plain reads.
+    pub fn open_with(path: impl AsRef<Path>, access: Access) -> Result<Self> {
+        if is_address(path.as_ref()) {
+            return Self::open_remote(path.as_ref(), &RemoteOptions::default());
+        }
+        let bytes = FileBytes::open(path.as_ref(), access)?;
+        let state = Some(bytes.state());
+        Ok(Self { state, ..Self::from_storage(path.as_ref(), bytes)? })
+    }
+
+    /// Opens a remote file by its address: `https://HOST/PATH`, `http://HOST/PATH` or `s3://BUCKET/KEY`. As a rule this takes
+    /// two requests. Messages show the address without passwords and signatures.
+    ///
+    /// # Errors
+    /// As [`Self::open`], and all that can be wrong on the way.
+    pub fn open_remote(address: &Path, options: &RemoteOptions) -> Result<Self> {
+        Self::from_kept(public_name(address), Box::new(remote::open(address, options)?))
+    }
+
+    /// Opens a file in any storage: memory, or bytes far away. `name` stands for it in messages. What is read of a
+    /// [remote](Storage::is_remote) storage is kept, up to 64 MiB.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn from_storage(name: impl Into<PathBuf>, storage: impl Storage + Send + Sync + 'static) -> Result<Self> {
+        Self::from_kept(name.into(), remote::kept(Box::new(storage)))
+    }
+
+    /// Opens a file in a storage that keeps what was read, if it is remote.
+    fn from_kept(path: PathBuf, storage: Box<dyn Storage + Send + Sync>) -> Result<Self> {
+        let failed = |source| Error::CoefficientFile { path: path.clone(), source };
+        let storage = Counted::new(storage);
+        let ends = [0..1, storage.len().saturating_sub(tail(storage.len()))..storage.len()];
+        storage.fetch(&ends).map_err(|e| failed(e.into()))?;
+        let reader = Reader::open(storage).map_err(failed)?;
+        let m = reader.metadata();
+        let (grid, blocks) = detail::whole(m);
+        let colour_transform = colour_transform(m).map_err(failed)?;
+        Ok(Self {
+            path,
+            grid,
+            blocks,
+            lod: 0,
+            exaggeration: 1.0,
+            colour_transform,
+            reader: reader.into(),
+            state: None,
+            skipped: None,
+            kept: None,
+        })
+    }
+
+    /// The file as a coarser lattice: every 2^lod-th voxel along each axis, with all frames and the same first voxel.
+    /// Decoding reads the coarse levels alone, so it takes about 8^lod times less work and fewer bytes. Samples are those
+    /// of the file; what lies between them is left out.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] if blocks do not begin on the lattice, or a window's pyramid does not refine all three axes.
+    pub fn with_detail(mut self, lod: u32) -> Result<Self> {
+        let (grid, blocks) = detail::coarse(self.metadata(), lod)?;
+        (self.grid, self.blocks, self.lod) = (grid.exaggerated(self.exaggeration), blocks, lod);
+        Ok(self)
+    }
+
+    /// The coarsest level of detail that [`Self::with_detail`] takes.
+    pub fn coarsest_detail(&self) -> u32 {
+        (0..32).take_while(|lod| detail::coarse(self.metadata(), *lod).is_ok()).last().unwrap_or(0)
+    }
+
+    /// The lattice of all voxels, whatever the level of detail.
+    pub fn whole_grid(&self) -> Grid {
+        detail::whole(self.metadata()).0.exaggerated(self.exaggeration)
+    }
+
+    /// The file with heights multiplied by a factor, finite and positive, for pictures of volumes that are nearly flat.
+    pub fn with_exaggeration(mut self, factor: f64) -> Self {
+        self.grid = self.grid.exaggerated(factor);
+        self.exaggeration *= factor;
+        self
+    }
+
+    /// The level of detail of [`Self::with_detail`]; 0 for all voxels.
+    pub fn lod(&self) -> u32 {
+        self.lod
+    }
+
+    /// Its path, or the name of its storage.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its identity.
+    pub fn id(&self) -> FileId {
+        self.reader.id()
+    }
+
+    /// Its length in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.reader.storage().len()
+    }
+
+    /// The source's description; `None` if the file has none.
+    ///
+    /// # Errors
+    /// The description is damaged, or cannot be read.
+    pub fn description(&self) -> Result<Option<Description>> {
+        self.reader.description().map_err(|source| Error::CoefficientFile { path: self.path.clone(), source })
+    }
+
+    /// Everything about the archive but its samples.
+    pub fn metadata(&self) -> &Metadata {
+        self.reader.metadata()
+    }
+
+    /// The type of the samples.
+    pub fn sample(&self) -> SampleType {
+        self.metadata().sample
+    }
+
+    /// Number of channels: 1, or of colours 3.
+    pub fn channels(&self) -> usize {
+        self.metadata().channels.into()
+    }
+
+    /// What made the samples of the source into the file's channels, if it holds colours.
+    pub fn colour_transform(&self) -> Option<&ColourTransform> {
+        self.colour_transform.as_ref()
+    }
+
+    /// The type of the source's samples, and what stands for a missing one.
+    #[doc(hidden)]
+    pub fn of_source(&self) -> (SampleType, Option<f64>) {
+        let plain = (self.sample(), self.metadata().missing_value);
+        self.colour_transform
+            .as_ref()
+            .map_or(plain, |colour_transform| (colour_transform.sample, colour_transform.missing_value))
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.metadata().frames as usize
+    }
+
+    /// Range of the decoded samples of all windows; (0, 0) if all are missing.
+    pub fn value_range(&self) -> (f64, f64) {
+        promise::value_range(self.metadata())
+    }
+
+    /// The value range, clamped to the range that shares refer to: decoded samples may exceed the source's.
+    #[doc(hidden)]
+    pub fn source_range(&self) -> (f64, f64) {
+        let ((lo, hi), (least, most)) = (self.value_range(), promise::range_of_shares(self.metadata()));
+        if least <= most { (lo.max(least).min(most), hi.min(most).max(least)) } else { (lo, hi) }
+    }
+
+    /// The number of samples or coefficients, whichever is larger, of the largest block.
+    #[doc(hidden)]
+    pub fn largest_block(&self) -> usize {
+        let windows = &self.metadata().windows;
+        let longest = windows.iter().map(|w| w.coefficients.max(w.frames) as usize).max().unwrap_or(0);
+        self.blocks.region(0).voxels() * longest
+    }
+
+    /// Bytes of memory to read and refine the largest block: payload, codes, coefficients, the mask of missing samples,
+    /// and exactly stored samples.
+    pub fn block_bytes(&self) -> usize {
+        let payload = 5;
+        self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
+    }
+
+    /// The window that holds a frame; the last one for frames past the end.
+    pub fn window_of(&self, frame: usize) -> u32 {
+        self.metadata().windows.partition_point(|w| w.first_frame as usize <= frame) as u32 - 1
+    }
+
+    /// The frames of a window.
+    pub fn window_range(&self, window: u32) -> Range<usize> {
+        let w = &self.metadata().windows[window as usize];
+        w.first_frame as usize..w.first_frame as usize + w.frames as usize
+    }
+
+    /// The codec that decodes a window's blocks.
+    #[doc(hidden)]
+    pub fn codec(&self, window: u32) -> Result<WindowCodec> {
+        Ok(WindowCodec { lod: self.lod, ..self.codec_of_all(window)? })
+    }
+
+    /// As [`Self::codec`], for all voxels.
+    fn codec_of_all(&self, window: u32) -> Result<WindowCodec> {
+        WindowCodec::from_metadata(self.metadata(), &self.metadata().windows[window as usize])
+            .map_err(|e| self.failed(e))
+    }
+
+    /// The directory's leaves of a window, of all channels.
+    #[doc(hidden)]
+    pub fn leaves(&self, window: u32) -> &[LeafEntry] {
+        self.reader.leaves(window)
+    }
+
+    /// The directory's leaves of one channel of a window.
+    pub(crate) fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
+        let leaves = self.leaves(window);
+        let each = leaves.len() / self.channels();
+        leaves.get(channel * each..(channel + 1) * each).unwrap_or_default()
+    }
+
+    /// Reads every block, then treats damaged ones as missing samples.
+    ///
+    /// # Errors
+    /// The storage cannot be read.
+    pub fn skip_damaged(mut self) -> Result<Self> {
+        let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
+        let leaves: Vec<_> = leaves.copied().collect();
+        let found = match self.is_remote() {
+            true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // threads would push out each other's pages
+            false => leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?,
+        };
+        let damage = Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() };
+        self.skipped = Some(damage.into());
+        self.kept = self.kept.map(|kept| Arc::new(kept.emptied())); // damaged blocks must not be found without skipping
+        Ok(self)
+    }
+
+    /// The damage to the blocks of a leaf; an error if the storage fails.
+    fn damage(&self, leaf: &LeafEntry) -> Result<Vec<(BlockId, String)>> {
+        let entries = match self.reader.leaf(leaf) {
+            Err(failed) if failed.is_io() => return Err(self.failed(failed)),
+            Err(wrong) => return Ok(leaf.ids().map(|id| (id, wrong.to_string())).collect()),
+            Ok(entries) => entries,
+        };
+        let mut found = Vec::new();
+        for entries in entries.chunks(BLOCKS_TOGETHER) {
+            self.fetch_whole(entries)?;
+            for entry in entries {
+                match self.reader.check_stored(entry) {
+                    Ok(()) => {}
+                    Err(failed) if failed.is_io() => return Err(self.failed(failed)),
+                    Err(wrong) => found.push((entry.id, wrong.to_string())),
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// What [`Self::skip_damaged`] found.
+    fn skipped(&self) -> Option<&Damage> {
+        self.skipped.as_deref().filter(|damage| !damage.blocks.is_empty())
+    }
+
+    /// An error that names the damaged blocks that were skipped, if any were. Call it last.
+    ///
+    /// # Errors
+    /// Blocks were skipped.
+    pub fn refuse_skipped(&self) -> Result<()> {
+        self.skipped().and_then(Damage::words).map_or(Ok(()), |what| Err(Error::input(&self.path, what)))
+    }
+
+    /// Whether any sample of a window may be missing.
+    pub fn has_missing(&self, window: u32) -> bool {
+        let record = &self.metadata().windows[window as usize];
+        record.missing > 0 || self.skipped().is_some_and(|damage| damage.is_in_window(window))
+    }
+
+    /// The entries of a leaf's blocks.
+    #[doc(hidden)]
+    pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
+        let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
+        let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
+        if leaf.ids().all(|id| is_lost(&id)) {
+            return Ok(leaf.ids().map(BlockEntry::lost).collect());
+        }
+        let entries = self.reader.leaf(leaf).map_err(|e| self.failed(e))?.into_iter();
+        Ok(entries.map(|entry| if is_lost(&entry.id) { BlockEntry::lost(entry.id) } else { entry }).collect())
+    }
+
+    /// The entries of the blocks of a channel and window that touch a region, in order, a leaf of the directory at a time.
+    #[doc(hidden)]
+    pub fn entries<'a>(
+        &'a self,
+        window: u32,
+        channel: usize,
+        region: &'a Region,
+    ) -> impl Iterator<Item = Result<Vec<BlockEntry>>> + use<'a> {
+        let fetched = self.fetch_leaves_of(std::iter::once(window), channel, region);
+        let entries = move |leaf| {
+            let touches = |entry: &BlockEntry| self.touches(entry.id.block, region);
+            Ok(self.leaf(leaf)?.into_iter().filter(touches).collect())
+        };
+        fetched.err().map(Err).into_iter().chain(self.reached(window, channel, region).map(entries))
+    }
+
+    /// The leaves of a channel and window that list blocks of a region.
+    pub(super) fn reached<'a>(
+        &'a self,
+        window: u32,
+        channel: usize,
+        region: &'a Region,
+    ) -> impl Iterator<Item = &'a LeafEntry> + use<'a> {
+        let lists =
+            move |l: &&LeafEntry| (l.first_block..).take(l.count.into()).any(|block| self.touches(block, region));
+        self.leaves_of(window, channel).iter().filter(lists)
+    }
+
+    fn touches(&self, block: u32, region: &Region) -> bool {
+        !self.blocks.region(block as usize).intersect(region).is_empty()
+    }
+
+    /// Reads the block of a directory entry; only the coefficients that `wanted` marks.
+    #[doc(hidden)]
+    pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
+        let size = self.all_voxels(entry)?;
+        if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
+            skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
+            return Ok(Block::missing(codec, size));
+        }
+        Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
+    }
+
+    /// All voxels of a block, decoded or not.
+    fn all_voxels(&self, entry: &BlockEntry) -> Result<[usize; 3]> {
+        self.reader.geometry(entry.id).map(|of| of.size).map_err(|e| self.failed(e))
+    }
+
+    /// The codec for [`Self::coarse`] of every `stride`-th voxel.
+    pub(crate) fn coarse_codec(&self, window: u32, stride: usize) -> Result<WindowCodec> {
+        let refined = detail::refines_space(&self.metadata().windows[window as usize]);
+        let lod = if refined { coarse::level_of(stride << self.lod) } else { 0 };
+        Ok(WindowCodec { lod, ..self.codec_of_all(window)? })
+    }
+
+    /// Every n-th sample along each axis of a block, in some frames of its window: frame after frame, x
+    /// fastest. NaN stands for missing samples, and for those of lost and damaged blocks that are skipped.
+    pub(crate) fn coarse(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        stride: usize,
+        frames: &[usize],
+    ) -> Result<Vec<f32>> {
+        let (size, stride) = (self.all_voxels(entry)?, stride << self.lod);
+        coarse::thinned(&self.reader, codec, entry, size, stride, frames).map_err(|e| self.failed(e))
+    }
+
+    /// Bytes of the file that were read so far.
+    pub fn bytes_read(&self) -> u64 {
+        self.reader.storage().bytes_read()
+    }
+
+    /// An error if a local file has changed since it was opened. Other storages report changes as they are read.
+    pub fn check_unchanged(&self) -> Result<()> {
+        self.state.map_or(Ok(()), |state| state.check_path(&self.path))
+    }
+
+    /// The error of a file whose parts contradict each other.
+    pub(crate) fn contradiction(&self, what: String) -> Error {
+        self.failed(wavesplat_format::Error::Invalid(what))
+    }
+
+    pub(super) fn failed(&self, source: wavesplat_format::Error) -> Error {
+        Error::CoefficientFile { path: self.path.clone(), source }
+    }
+}
+
+/// Bytes at the end of a file of `len` bytes that likely hold its metadata and the root of its directory.
+fn tail(len: u64) -> u64 {
+    (len / 512).clamp(64 << 10, 4 << 20)
+}
+
+/// The value of one of a file's settings.
+pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
+    file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+}
+
+/// The times of a file's frames, and how they are written.
+pub fn time_labels(file: &Metadata) -> TimeLabels {
+    TimeLabels::new(file.times.clone(), setting(file, "time-units"), setting(file, "calendar"))
+}
+
+/// The transform from samples to the file's channels; an error if the file has several channels and does not state a
+/// transform.
+fn colour_transform(m: &Metadata) -> std::result::Result<Option<ColourTransform>, wavesplat_format::Error> {
+    if m.channels == 1 {
+        return Ok(None);
+    }
+    let coloured = usize::from(m.channels) == CHANNELS.len() && m.sample == ColourTransform::SAMPLE;
+    let colour_transform = if coloured && m.missing_value.is_none() {
+        ColourTransform::of_settings(|name| setting(m, name))
+    } else {
+        None
+    };
+    let unsupported = || wavesplat_format::Error::Unsupported(format!("{} channels of no known colours", m.channels));
+    colour_transform.map(Some).ok_or_else(unsupported)
+}

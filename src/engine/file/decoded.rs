@@ -1,0 +1,210 @@
+//! Blocks of an open file that stay decoded for the next pictures and reads, up to a number of bytes.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use wavesplat_core::codec::buffer::{self, Buffer};
+use wavesplat_core::codec::decode::Block;
+use wavesplat_core::codec::field::Field;
+use wavesplat_format::{BlockId, PartKind};
+
+/// A block, and its coefficients if they have to be decoded together.
+#[derive(Debug)]
+pub(crate) struct DecodedBlock {
+    pub(crate) block: Block,
+    pub(crate) field: Option<Field<'static>>,
+}
+
+impl DecodedBlock {
+    fn bytes(&self) -> usize {
+        self.block.held_bytes() + self.field.as_ref().map_or(0, Field::held_bytes)
+    }
+}
+
+/// What is decoded of a block at a level of detail.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct DecodedKey {
+    pub(super) id: BlockId,
+    pub(super) lod: u32,
+    pub(super) form: DecodedForm,
+}
+
+/// The form in which a block is decoded.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) enum DecodedForm {
+    /// The coefficients that are marked, of some parts.
+    Coefficients { wanted: Vec<bool>, parts: Vec<PartKind> },
+    /// All samples of the window.
+    Samples,
+}
+
+#[derive(Debug, Clone)]
+enum Decoded {
+    Block(Arc<DecodedBlock>),
+    Samples(Arc<Buffer<u8>>),
+}
+
+/// A cache of decoded blocks. A new block replaces the least recently used ones, but none that the previous run used: so a
+/// run over more blocks than fit still finds some of them.
+#[derive(Debug)]
+pub(super) struct DecodedBlocks {
+    room: usize,
+    kept: Mutex<Kept>,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    entries: HashMap<DecodedKey, Entry>,
+    /// Blocks that were read in part.
+    seen: HashSet<(BlockId, u32)>,
+    bytes: usize,
+    run: u64,
+}
+
+#[derive(Debug)]
+struct Entry {
+    decoded: Decoded,
+    bytes: usize,
+    /// The last run that used it.
+    used: u64,
+}
+
+/// The largest number of blocks in `seen`; with more, the set begins anew.
+const MOST_SEEN: usize = 1 << 16;
+
+impl DecodedBlocks {
+    /// Room for this many bytes.
+    pub(super) fn new(room: usize) -> Self {
+        Self { room, kept: Mutex::default() }
+    }
+
+    /// The same room, empty.
+    pub(super) fn emptied(&self) -> Self {
+        Self::new(self.room)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins a run: a picture, or a read of samples.
+    pub(super) fn begin_run(&self) {
+        self.kept().run += 1;
+    }
+
+    /// Whether a block was read in part before. It is remembered.
+    pub(super) fn is_read_again(&self, id: BlockId, lod: u32) -> bool {
+        let seen = &mut self.kept().seen;
+        if seen.len() >= MOST_SEEN {
+            seen.clear();
+        }
+        !seen.insert((id, lod))
+    }
+
+    /// The coefficients of a block, if they are kept.
+    pub(super) fn block(&self, key: &DecodedKey) -> Option<Arc<DecodedBlock>> {
+        match self.kept().get(key)? {
+            Decoded::Block(block) => Some(block),
+            Decoded::Samples(_) => None,
+        }
+    }
+
+    /// The samples of a block, if they are kept.
+    pub(super) fn samples(&self, key: &DecodedKey) -> Option<Arc<Buffer<u8>>> {
+        match self.kept().get(key)? {
+            Decoded::Samples(samples) => Some(samples),
+            Decoded::Block(_) => None,
+        }
+    }
+
+    /// Keeps a block if there is room.
+    pub(super) fn keep_block(&self, key: DecodedKey, block: &Arc<DecodedBlock>) {
+        self.kept().put(key, Decoded::Block(block.clone()), block.bytes(), self.room);
+    }
+
+    /// Keeps samples if there is room.
+    pub(super) fn keep_samples(&self, key: DecodedKey, samples: &Arc<Buffer<u8>>) {
+        self.kept().put(key, Decoded::Samples(samples.clone()), samples.len(), self.room);
+    }
+}
+
+impl Drop for DecodedBlocks {
+    /// Returns the memory to the system: buffers that are dropped go to a pool.
+    fn drop(&mut self) {
+        self.kept().entries.clear();
+        buffer::release_spare();
+    }
+}
+
+impl Kept {
+    fn get(&mut self, key: &DecodedKey) -> Option<Decoded> {
+        let entry = self.entries.get_mut(key)?;
+        entry.used = self.run;
+        Some(entry.decoded.clone())
+    }
+
+    fn put(&mut self, key: DecodedKey, decoded: Decoded, bytes: usize, room: usize) {
+        if bytes > room || self.entries.contains_key(&key) {
+            return;
+        }
+        while self.bytes + bytes > room {
+            let old = self.entries.iter().filter(|(_, entry)| entry.used + 1 < self.run);
+            let Some(oldest) = old.min_by_key(|(_, entry)| entry.used).map(|(key, _)| key.clone()) else { return };
+            self.bytes -= self.entries.remove(&oldest).map_or(0, |entry| entry.bytes);
+        }
+        self.bytes += bytes;
+        self.entries.insert(key, Entry { decoded, bytes, used: self.run });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(block: u32) -> DecodedKey {
+        DecodedKey { id: BlockId { window: 0, block, channel: 0 }, lod: 0, form: DecodedForm::Samples }
+    }
+
+    fn keep(blocks: &DecodedBlocks, block: u32) {
+        blocks.keep_samples(key(block), &Arc::new(Buffer::with_len(100)));
+    }
+
+    fn kept(blocks: &DecodedBlocks, all: std::ops::Range<u32>) -> Vec<u32> {
+        all.filter(|block| blocks.kept().entries.contains_key(&key(*block))).collect()
+    }
+
+    #[test]
+    fn never_more_is_kept_than_there_is_room_for() {
+        let blocks = DecodedBlocks::new(1000);
+        for run in 0..50 {
+            blocks.begin_run();
+            (0..7).for_each(|block| keep(&blocks, run * 3 + block));
+            let kept = blocks.kept();
+            assert!(kept.bytes <= 1000 && kept.bytes == 100 * kept.entries.len());
+        }
+        blocks.keep_samples(key(1000), &Arc::new(Buffer::with_len(1001)));
+        assert!(kept(&blocks, 1000..1001).is_empty());
+    }
+
+    #[test]
+    fn a_run_through_too_many_blocks_finds_some_again() {
+        let blocks = DecodedBlocks::new(1000);
+        for _ in 0..5 {
+            blocks.begin_run();
+            (0..40).for_each(|block| keep(&blocks, block));
+            assert_eq!(kept(&blocks, 0..40), (0..10).collect::<Vec<_>>());
+            assert!((0..10).all(|block| blocks.samples(&key(block)).is_some()));
+        }
+    }
+
+    #[test]
+    fn the_least_recently_used_make_room() {
+        let blocks = DecodedBlocks::new(300);
+        (0..3).for_each(|block| keep(&blocks, block));
+        for run in 0..4 {
+            blocks.begin_run();
+            assert!(blocks.samples(&key(run % 2)).is_some());
+        }
+        keep(&blocks, 3);
+        assert_eq!(kept(&blocks, 0..4), [0, 1, 3]);
+    }
+}

@@ -1,0 +1,175 @@
+//! Fetches parts of a remote file together: the ranges that will be read soon are requested in advance, in few
+//! requests.
+
+use super::CoefficientFile;
+use crate::remote::{FETCHED, PageCount};
+use rayon::prelude::*;
+use std::ops::Range;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::decode::Block;
+use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
+
+/// Blocks that are fetched together to be checked.
+pub(super) const BLOCKS_TOGETHER: usize = 32;
+
+/// Windows that are fetched together at most.
+const WINDOWS_TOGETHER: usize = 256;
+
+/// Fetches parts of many blocks of a remote file before they are read, in few requests.
+#[derive(Debug)]
+pub struct Prefetch<'a> {
+    file: &'a CoefficientFile,
+    parts: Vec<PartEntry>,
+    pages: PageCount,
+}
+
+impl<'a> Prefetch<'a> {
+    /// `None` for a local file, which needs none.
+    pub fn new(file: &'a CoefficientFile) -> Option<Self> {
+        file.is_remote().then(|| Self { file, parts: Vec::new(), pages: PageCount::default() })
+    }
+
+    /// Fetches the leaves of a channel that list blocks of a region, of the first windows. Each window is given by some of
+    /// its frames.
+    pub fn leaves<'f>(
+        &self,
+        windows: impl Iterator<Item = &'f [usize]>,
+        channel: usize,
+        region: &Region,
+    ) -> Result<()> {
+        let windows = windows.take(WINDOWS_TOGETHER).map(|frames| self.file.window_of(frames[0]));
+        self.file.fetch_leaves_of(windows, channel, region)
+    }
+
+    /// Calls `add` for each item, until there are as many parts as should be fetched together. Returns the number of these
+    /// items.
+    pub fn gather<T>(
+        &mut self,
+        items: impl IntoIterator<Item = T>,
+        mut add: impl FnMut(T, &mut Self) -> Result<()>,
+    ) -> Result<usize> {
+        let mut count = 0;
+        for item in items.into_iter().take(WINDOWS_TOGETHER) {
+            if self.is_full() {
+                break;
+            }
+            add(item, self)?;
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    /// Adds the parts of a block that the coefficients marked by `wanted` need.
+    pub fn add(&mut self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) {
+        for part in Block::parts(codec, entry, wanted) {
+            self.pages.add(&bytes_of(part));
+            self.parts.push(*part);
+        }
+    }
+
+    /// Whether the parts fill as many pages as should be fetched together.
+    pub(crate) fn is_full(&self) -> bool {
+        self.pages.is_full()
+    }
+
+    /// Fetches the parts that were added.
+    pub fn finish(self) -> Result<()> {
+        self.file.fetch_parts(self.parts.iter())
+    }
+}
+
+fn bytes_of(part: &PartEntry) -> Range<u64> {
+    part.offset..part.offset.saturating_add(part.stored_len.into())
+}
+
+impl CoefficientFile {
+    /// Frames by windows.
+    pub fn by_window<'f>(&self, frames: &'f [usize]) -> impl Iterator<Item = &'f [usize]> {
+        frames.chunk_by(|a, b| self.window_of(*a) == self.window_of(*b))
+    }
+
+    /// Whether the file is remote, so that bytes should be fetched before they are read.
+    pub(super) fn is_remote(&self) -> bool {
+        self.reader.storage().is_remote()
+    }
+
+    /// Fetches bytes of a remote file that will be read soon: the first ones, as many as it keeps.
+    fn fetch(&self, ranges: impl Iterator<Item = Range<u64>>) -> Result<()> {
+        if !self.is_remote() {
+            return Ok(());
+        }
+        let ranges: Vec<Range<u64>> = ranges.collect();
+        self.reader.storage().fetch(&ranges).map_err(|e| self.failed(e.into()))
+    }
+
+    /// Fetches the leaves of a channel of some windows that list blocks of a region.
+    pub(super) fn fetch_leaves_of(
+        &self,
+        windows: impl Iterator<Item = u32>,
+        channel: usize,
+        region: &Region,
+    ) -> Result<()> {
+        self.fetch(windows.flat_map(|window| self.reached(window, channel, region)).map(LeafEntry::bytes))
+    }
+
+    /// Fetches the bytes of a remote file from `offset` on, as many as it keeps; returns where they end.
+    pub(crate) fn fetch_on(&self, offset: u64) -> Result<u64> {
+        let end = if self.is_remote() { self.bytes().min(offset.saturating_add(FETCHED)) } else { u64::MAX };
+        self.fetch(std::iter::once(offset..end))?;
+        Ok(end)
+    }
+
+    /// Fetches parts that will be read soon.
+    fn fetch_parts<'a>(&self, parts: impl Iterator<Item = &'a PartEntry>) -> Result<()> {
+        self.fetch(parts.map(bytes_of))
+    }
+
+    /// Fetches the parts of some blocks that the coefficients marked by `wanted` need.
+    pub fn fetch_blocks(&self, codec: &WindowCodec, entries: &[BlockEntry], wanted: &[bool]) -> Result<()> {
+        self.fetch_parts(entries.iter().flat_map(|entry| Block::parts(codec, entry, wanted)))
+    }
+
+    /// Fetches all of some blocks.
+    pub(crate) fn fetch_whole(&self, entries: &[BlockEntry]) -> Result<()> {
+        self.fetch_parts(entries.iter().flat_map(|entry| &entry.parts))
+    }
+
+    /// The samples of whole blocks, decoded side by side: of each block all frames of its window, little-endian in the
+    /// file's [type](Self::sample), x fastest, then y, z, and time slowest. [`Self::blocks`] says which voxels a block has.
+    ///
+    /// A remote file is asked for all blocks of a window at once. The result is held in memory: ask for as many blocks as
+    /// fit.
+    ///
+    /// # Errors
+    /// [`Error::CoefficientFile`](crate::Error::CoefficientFile) for a block that is damaged or that the file lacks.
+    pub fn read_blocks(&self, ids: &[BlockId]) -> Result<Vec<Vec<u8>>> {
+        let mut blocks = Vec::with_capacity(ids.len());
+        for ids in ids.chunk_by(|a, b| a.window == b.window) {
+            let entries = self.entries_of(ids)?;
+            let codec = self.codec(ids[0].window)?;
+            let all = vec![true; codec.basis.coefficients()];
+            self.fetch_blocks(&codec, &entries, &all)?;
+            let decode =
+                |entry: &BlockEntry| self.block(&codec, entry, &all).map(|block| block.samples(&codec).to_vec());
+            blocks.extend(entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?);
+        }
+        Ok(blocks)
+    }
+
+    /// The entries of some blocks; a leaf of the directory is read once for neighbours.
+    fn entries_of(&self, ids: &[BlockId]) -> Result<Vec<BlockEntry>> {
+        let mut leaf = Vec::new();
+        let find = |leaf: &[BlockEntry], id| leaf.iter().find(|entry| entry.id == id).cloned();
+        let mut entry = |id: BlockId| {
+            if let Some(found) = find(&leaf, id) {
+                return Ok(found);
+            }
+            let holds = |l: &&_| LeafEntry::ids(l).any(|held| held == id);
+            leaf = self.leaves(id.window).iter().find(holds).map_or(Ok(Vec::new()), |l| self.leaf(l))?;
+            find(&leaf, id).ok_or_else(|| self.contradiction(format!("{id}: the archive has no such block")))
+        };
+        ids.iter().map(|id| entry(*id)).collect()
+    }
+}

@@ -1,0 +1,86 @@
+//! Decoding blocks of a file that keeps some decoded.
+
+use super::coefficient_file::CoefficientFile;
+use super::decoded::{DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey};
+use std::sync::Arc;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::buffer::Buffer;
+use wavesplat_format::BlockEntry;
+
+impl CoefficientFile {
+    /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
+    pub fn keeping_decoded(mut self, bytes: usize) -> Self {
+        self.kept = Some(Arc::new(DecodedBlocks::new(bytes)));
+        self
+    }
+
+    /// Whether blocks stay decoded.
+    pub fn keeps_decoded(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// Begins a picture or a read of samples, which uses blocks that earlier ones decoded.
+    pub fn begin_run(&self) {
+        if let Some(kept) = &self.kept {
+            kept.begin_run();
+        }
+    }
+
+    /// As [`Self::block`], with the coefficients if they have to be decoded together. Uses and keeps what was decoded.
+    pub(crate) fn decoded(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+        is_field_needed: bool,
+    ) -> Result<Arc<DecodedBlock>> {
+        let decode = || {
+            let block = self.block(codec, entry, wanted)?;
+            let has_field = is_field_needed && block.exact.is_none();
+            let field = if has_field { block.field_at_once(codec, wanted) } else { None };
+            Ok(Arc::new(DecodedBlock { block, field }))
+        };
+        let Some(kept) = self.kept.as_ref().filter(|_| is_field_needed) else { return decode() };
+        let parts = entry.parts.iter().map(|part| part.kind).collect();
+        let key = self.key(entry, DecodedForm::Coefficients { wanted: wanted.to_vec(), parts });
+        if let Some(block) = kept.block(&key) {
+            return Ok(block);
+        }
+        let block = decode()?;
+        kept.keep_block(key, &block);
+        Ok(block)
+    }
+
+    /// The samples of a block in all frames of its window, and the stored bytes read. Only the frames for which the
+    /// coefficients in `wanted` suffice are valid. Uses the cache, and adds blocks that are read again. If the caller needs
+    /// only a part of the block (`is_part`), the cache takes it at the first read.
+    pub fn samples(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+        is_part: bool,
+    ) -> Result<(Arc<Buffer<u8>>, u64)> {
+        let decode = |wanted: &[bool]| {
+            self.block(codec, entry, wanted).map(|block| (Arc::new(block.samples(codec)), block.bytes_read))
+        };
+        let Some(kept) = &self.kept else { return decode(wanted) };
+        let key = self.key(entry, DecodedForm::Samples);
+        if let Some(samples) = kept.samples(&key) {
+            return Ok((samples, 0));
+        }
+        let (is_again, is_whole) = (kept.is_read_again(entry.id, self.lod), wanted.iter().all(|wanted| *wanted));
+        let is_kept = is_again || is_part && is_whole;
+        if !is_kept {
+            return decode(wanted);
+        }
+        let (samples, bytes_read) = decode(&vec![true; wanted.len()])?;
+        kept.keep_samples(key, &samples);
+        Ok((samples, bytes_read))
+    }
+
+    fn key(&self, entry: &BlockEntry, form: DecodedForm) -> DecodedKey {
+        DecodedKey { id: entry.id, lod: self.lod, form }
+    }
+}

@@ -1,0 +1,24 @@
+//! The `.wspl` file and its safety: opening it, reporting its error bound, checking it, and recovering intact blocks.
+//!
+//! [`CoefficientFile`] is the only door to stored bytes. Nothing here codes samples (that is
+//! [`crate::convert`]) or makes pictures (that is [`crate::render`]).
+
+mod counted;
+mod detail;
+pub mod promise;
+mod fetch;
+mod decoded;
+mod coefficient_file;
+mod keep;
+mod check;
+pub mod shard;
+pub mod report;
+pub mod verify;
+pub mod recover;
+pub mod repack;
+pub mod merge;
+pub mod resume;
+
+pub use coefficient_file::{CoefficientFile, setting, time_labels};
+pub(crate) use decoded::DecodedBlock;
+pub use fetch::Prefetch;

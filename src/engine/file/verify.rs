@@ -1,0 +1,323 @@
+//! Verifies that a coefficient file is intact, and that it keeps its error bound.
+
+use crate::file::CoefficientFile;
+use rayon::prelude::*;
+use serde::Serialize;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::memory::MOST_BLOCKS;
+use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::sample::{self, join_ranges};
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::bound;
+use wavesplat_core::codec::decode::Block;
+use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
+use wavesplat_format::{BlockEntry, PartKind};
+
+/// The result of checking a file, with its source if one is given.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct VerifyReport {
+    /// Blocks that were read and decoded.
+    pub blocks: u64,
+    /// Bytes of the file, all of them checked.
+    pub bytes: u64,
+    /// Places where it is damaged, and blocks that were lost before it was recovered.
+    pub damaged: u64,
+    /// Blocks that could not be checked, since what lists them is damaged.
+    pub unchecked: u64,
+    /// Descriptions of the first damage, at most [`MOST_NAMED`].
+    pub damage: Vec<String>,
+    /// The comparison of all intact blocks with the source.
+    pub against: Option<Comparison>,
+}
+
+/// Damage that is named; the rest is counted.
+pub const MOST_NAMED: usize = 1000;
+
+impl VerifyReport {
+    fn damage(&mut self, wrong: &Error) {
+        self.damaged += 1;
+        if self.damage.len() < MOST_NAMED {
+            self.damage.push(match wrong {
+                Error::CoefficientFile { source, .. } => source.to_string(),
+                other => other.to_string(),
+            });
+        }
+    }
+
+    /// The result of a read; `None` if it found damage, which is noted. Other failures are errors.
+    fn whole<T>(&mut self, read: Result<T>) -> Result<Option<T>> {
+        match read {
+            Ok(read) => Ok(Some(read)),
+            Err(wrong) if matches!(&wrong, Error::CoefficientFile { source, .. } if !source.is_io()) => {
+                self.damage(&wrong);
+                Ok(None)
+            }
+            Err(other) => Err(other),
+        }
+    }
+}
+
+/// The result of a comparison with the source.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Comparison {
+    /// Samples compared.
+    pub samples: u64,
+    /// Largest error of a sample, as it is extracted and as it is splatted, rounded up.
+    pub largest_error: f64,
+    /// Root of the mean squared error over all samples that are not missing.
+    pub rms_error: f64,
+    /// Missing samples, found missing and with the same bytes in both.
+    pub missing: u64,
+    /// The largest share of its bound that a series uses, in the bound's own measure; more than 1 is outside.
+    pub largest_share_of_bound: f64,
+    /// Where that was, if there was any error: the worst sample of the series.
+    pub worst: Option<SampleLocation>,
+    /// Series (of a voxel in a window) outside the bound.
+    pub series_outside: u64,
+    /// Blocks with an error or a value beyond what the directory or the window's record states.
+    pub blocks_beyond_stated: u64,
+    /// The first of them.
+    pub first_beyond: Option<BlockPlace>,
+    #[serde(skip)]
+    squares: f64,
+}
+
+/// A block of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct BlockPlace {
+    /// The window, counted from 0.
+    pub window: u32,
+    /// The block in it, x fastest.
+    pub block: u32,
+    /// Its channel, if the file has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
+}
+
+/// A sample of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct SampleLocation {
+    /// The frame, counted from the file's first.
+    pub frame: usize,
+    /// The voxel: x, y, z, counted from the file's first.
+    pub voxel: [usize; 3],
+    /// Its channel, if the file has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<&'static str>,
+}
+
+impl std::fmt::Display for SampleLocation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [x, y, z] = self.voxel;
+        write!(f, "frame {}, x {x}, y {y}, z {z}", self.frame)?;
+        self.channel.map_or(Ok(()), |channel| write!(f, ", {channel}"))
+    }
+}
+
+impl Comparison {
+    fn join(self, other: Self) -> Self {
+        let worse = other.largest_share_of_bound > self.largest_share_of_bound;
+        Self {
+            worst: if worse { other.worst } else { self.worst },
+            samples: self.samples + other.samples,
+            largest_error: self.largest_error.max(other.largest_error),
+            rms_error: 0.0,
+            missing: self.missing + other.missing,
+            largest_share_of_bound: self.largest_share_of_bound.max(other.largest_share_of_bound),
+            series_outside: self.series_outside + other.series_outside,
+            blocks_beyond_stated: self.blocks_beyond_stated + other.blocks_beyond_stated,
+            first_beyond: self.first_beyond.or(other.first_beyond),
+            squares: self.squares + other.squares,
+        }
+    }
+}
+
+/// Checks every byte of the file, also after finding damage, and with a source every sample. The source must have the
+/// frames and the region that were converted. `memory` is the number of bytes that may be allocated; at least one block
+/// is decoded at a time.
+pub fn verify(
+    file: &CoefficientFile,
+    mut source: Option<&mut dyn FrameSource>,
+    memory: usize,
+    progress: &dyn Progress,
+) -> Result<VerifyReport> {
+    progress.start(Some(file.metadata().blocks()));
+    if let Some(source) = &source {
+        same_shape(file, *source)?;
+    }
+    // The samples of the source and the extracted ones, each in their type and as f64, and the splatted values as f64.
+    let block_bytes = file.block_bytes() + file.largest_block() * (2 * file.sample().size() + 3 * size_of::<f64>());
+    let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
+    let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
+    file.check_structure(&mut |wrong| report.damage(&wrong))?;
+    let (mut all, mut fetched) = (Comparison::default(), 0);
+    for window in 0..file.metadata().windows.len() as u32 {
+        let codec = file.codec(window)?;
+        let range = file.window_range(window);
+        let frames = source.as_mut().map(|s| s.window(range.start, range.len())).transpose()?;
+        if let Some(frames) = frames.as_ref().filter(|f| f.frames() < range.len()) {
+            let what = format!("ends after {} frames, {} were converted", range.start + frames.frames(), file.frames());
+            return Err(Error::input(frames.name(0), what));
+        }
+        for leaf in file.leaves(window) {
+            if leaf.data_offset >= fetched {
+                fetched = file.fetch_on(leaf.data_offset)?;
+            }
+            let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
+            let entries = report.whole(file.leaf(leaf))?;
+            report.unchecked += if entries.is_none() { u64::from(leaf.count) } else { 0 };
+            let entries = entries.unwrap_or_default();
+            let mut at = leaf.data_offset;
+            for entries in entries.chunks(at_once) {
+                file.fetch_whole(entries)?;
+                at = file.check_blocks(at, entries, &mut |wrong| report.damage(&wrong))?;
+                for found in entries.par_iter().map(check).collect::<Vec<_>>() {
+                    all = report.whole(found)?.map_or(all, |found| all.join(found));
+                }
+            }
+            file.check_leaf_end(leaf, &mut |wrong| report.damage(&wrong))?;
+            report.blocks += entries.len() as u64;
+            progress.advance(leaf.count.into());
+        }
+        frames.map_or(Ok(()), |frames| frames.check_unchanged())?;
+    }
+    file.check_unchanged()?;
+    progress.finish();
+    if source.is_some() {
+        all.rms_error = (all.squares / all.samples.saturating_sub(all.missing).max(1) as f64).sqrt();
+        report.against = Some(all);
+    }
+    Ok(report)
+}
+
+fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
+    let (a, b) = (source.archive(), file);
+    let (sample, _) = file.of_source();
+    if a.grid.dims != b.grid.dims || a.sample != sample || a.frames.is_some_and(|f| f != b.frames()) {
+        let [x, y, z] = a.grid.dims;
+        let [fx, fy, fz] = b.grid.dims;
+        let frames = a.frames.map_or("unknown".into(), |f| f.to_string());
+        let source = format!("{frames} frames of {x}x{y}x{z} {} samples", a.sample);
+        let what = format!("{source}, but the file holds {} of {fx}x{fy}x{fz} {sample}", b.frames());
+        return Err(Error::setting("against", Note::with(what, Remedy::ChooseFrames)));
+    }
+    Ok(())
+}
+
+/// Decodes a block, which checks all its parts, and compares it with the source, if there is one.
+fn check_block(
+    file: &CoefficientFile,
+    codec: &WindowCodec,
+    entry: &BlockEntry,
+    source: Option<&dyn FrameWindow>,
+) -> Result<Comparison> {
+    let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
+    check_coefficients(file, entry, &block, codec)?;
+    let Some(source) = source else { return Ok(Comparison::default()) };
+    let region = file.blocks.region(entry.id.block as usize);
+    let original = original(file, source, codec, entry, &region)?;
+    let first_frame = file.window_range(entry.id.window).start;
+    let channel = file.colour_transform().and_then(|_| CHANNELS.get(usize::from(entry.id.channel)).copied());
+    let place =
+        |frame: usize, voxel: usize| SampleLocation { frame: first_frame + frame, voxel: region.voxel(voxel), channel };
+    let (mut found, (lo, hi)) = compare(codec, &original, &block, place);
+    let stated = entry.stats.reached.min(file.metadata().windows[entry.id.window as usize].reached);
+    if found.largest_error > stated || lo < entry.stats.min || hi > entry.stats.max {
+        found.blocks_beyond_stated = 1;
+        found.first_beyond = Some(BlockPlace { window: entry.id.window, block: entry.id.block, channel });
+    }
+    Ok(found)
+}
+
+/// The samples of a block as they were coded.
+fn original(
+    file: &CoefficientFile,
+    source: &dyn FrameWindow,
+    codec: &WindowCodec,
+    entry: &BlockEntry,
+    region: &Region,
+) -> Result<Vec<u8>> {
+    let frames = 0..codec.frames();
+    let Some(colour_transform) = file.colour_transform() else {
+        return read_frames(source, frames, region, codec.sample);
+    };
+    let channel = ColourWindow { window: source, colour_transform, channel: entry.id.channel.into() };
+    read_frames(&channel, frames, region, codec.sample)
+}
+
+/// Checks that no coefficient is larger than the directory states; skipping of parts relies on this.
+fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
+    let largest_of_parts = block.largest(codec);
+    for part in &entry.parts {
+        let PartKind::Level(level) = part.kind else { continue };
+        let largest = largest_of_parts[usize::from(level)];
+        if largest > part.stats.largest {
+            let what =
+                format!("{} holds {largest:e}, larger than the directory says: {:e}", entry.id, part.stats.largest);
+            return Err(file.contradiction(what));
+        }
+    }
+    Ok(())
+}
+
+/// Compares the samples of a block, in the order `frame * voxels + voxel`; `place(frame, voxel)` is the place of a
+/// sample in messages. Also returns the range of the extracted samples that are not missing.
+fn compare(
+    codec: &WindowCodec,
+    original: &[u8],
+    decoded: &Block,
+    place: impl Fn(usize, usize) -> SampleLocation,
+) -> (Comparison, (f64, f64)) {
+    let size = codec.sample.size();
+    let samples = original.len() / size;
+    let voxels = samples / codec.frames();
+    let mut source = vec![0.0; samples];
+    sample::load(codec.sample, original, &mut source);
+    let (bytes, splatted) = decoded.samples_and_values(codec);
+    let mut extracted = vec![0.0; samples];
+    sample::load(codec.sample, &bytes, &mut extracted);
+    let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
+    let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
+    let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+    for voxel in 0..voxels {
+        let errors: Vec<(f64, f64)> = (voxel..samples)
+            .step_by(voxels)
+            .map(|i| {
+                let missing = codec.is_missing(source[i]);
+                found.missing += u64::from(missing && same(i));
+                match missing {
+                    true if same(i) => (0.0, 0.0),
+                    true => (f64::INFINITY, 0.0),
+                    false => {
+                        range = join_ranges(range, (extracted[i], extracted[i]));
+                        (codec.error(splatted[i], extracted[i], source[i]), codec.bound.allowed(source[i]))
+                    }
+                }
+            })
+            .collect();
+        add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
+    }
+    (found, range)
+}
+
+/// Adds the errors of a series, each with what is allowed.
+fn add_series(
+    codec: &WindowCodec,
+    errors: &[(f64, f64)],
+    place: impl Fn(usize) -> SampleLocation,
+    found: &mut Comparison,
+) {
+    let largest = errors.iter().fold(0.0, |largest, (e, _)| e.max(largest));
+    found.largest_error = found.largest_error.max(largest);
+    found.squares += errors.iter().map(|(e, _)| e * e).sum::<f64>();
+    let holds = codec.bound.holds(errors.iter().copied());
+    found.series_outside += u64::from(!holds);
+    let share = codec.bound.share(errors.iter().copied());
+    let share = if holds { share.min(1.0) } else { share }; // rounded up beyond what holds
+    if share > found.largest_share_of_bound {
+        found.largest_share_of_bound = share;
+        let shares = errors.iter().map(|(e, allowed)| bound::share(*e, *allowed)).enumerate();
+        found.worst = shares.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(frame, _)| place(frame));
+    }
+}

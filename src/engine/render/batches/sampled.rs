@@ -1,0 +1,62 @@
+//! Modes that need the samples of blocks: how much fits in memory, and the loop over their batches.
+
+use super::driver::{Job, for_each_batch};
+use super::samples::SampleReader;
+use super::scene::{FrameBatch, Scene};
+use crate::render::config::RenderConfig;
+use crate::render::report::RenderReport;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::memory;
+use wavesplat_core::base::progress::Progress;
+
+/// The memory of a view whose blocks are decoded to samples.
+pub(in crate::render) struct SampledView<'a> {
+    pub(in crate::render) config: &'a RenderConfig,
+    /// Bytes for a number of frames that are rendered together, without blocks.
+    pub(in crate::render) frame_bytes: &'a dyn Fn(usize) -> usize,
+}
+
+impl SampledView<'_> {
+    /// The least memory in bytes with which the view can be rendered.
+    pub(in crate::render) fn least_memory(&self, scene: &dyn Scene) -> usize {
+        self.bytes(scene, 1, 1)
+    }
+
+    /// Renders all frames, as many at a time as fit. `render` makes the pictures of a batch, frame after frame; `give`
+    /// takes them.
+    pub(in crate::render) fn render(
+        &self,
+        scene: &mut dyn Scene,
+        progress: &dyn Progress,
+        report: &mut RenderReport,
+        mut render: impl FnMut(&SampleReader<'_>, &mut RenderReport) -> Result<Vec<f32>>,
+        mut give: impl FnMut(&[usize], &[f32]) -> Result<()>,
+    ) -> Result<()> {
+        let (blocks, at_a_time) = (scene.blocks(), self.blocks_at_a_time(scene));
+        let fits = |scene: &dyn Scene, frames: usize| self.bytes(scene, frames, at_a_time) <= self.config.memory;
+        let together = |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n)).unwrap_or(1);
+        let job = Job { config: self.config, together: &together, views: &[] };
+        let render = |batch: &dyn FrameBatch, report: &mut RenderReport| {
+            render(&SampleReader { batch, blocks, at_a_time, progress }, report)
+        };
+        for_each_batch(scene, job, report, render, |frames, channels, _| give(frames, &channels[0].pictures))
+    }
+
+    fn blocks_at_a_time(&self, scene: &dyn Scene) -> usize {
+        let fits = |blocks: &usize| self.bytes(scene, 1, *blocks) <= self.config.memory;
+        (1..=rayon::current_num_threads()).rev().find(fits).unwrap_or(1)
+    }
+
+    /// Bytes to render `frames` frames together, with `blocks` blocks decoded at a time.
+    fn bytes(&self, scene: &dyn Scene, frames: usize, blocks: usize) -> usize {
+        memory::FIXED + (self.frame_bytes)(frames) + blocks * block_bytes(scene, self.config, frames)
+    }
+}
+
+/// Bytes of a decoded block, with its samples in all frames, and its coefficients if these are inverted.
+fn block_bytes(scene: &dyn Scene, config: &RenderConfig, frames: usize) -> usize {
+    let voxels = scene.blocks().region(0).voxels();
+    let coefficients = scene.most_planes(frames, config).saturating_sub(2 * frames + 1);
+    let inverted = if coefficients > 0 { (coefficients + 2 * frames) * size_of::<f64>() } else { 0 };
+    scene.block_bytes() + voxels * (frames * size_of::<f32>() + 2 * size_of::<f64>() + inverted)
+}

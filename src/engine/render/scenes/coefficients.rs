@@ -1,0 +1,363 @@
+//! Rendering from coefficients, the method of [Dobashi](wavesplat_core::bibliography): the coefficients of a file are splatted
+//! once for all frames of a window (eq 9), and each pixel is inverted (eq 8). Decoded samples can be splatted instead
+//! (eq 4).
+
+use super::batch_plan::{BatchPlan, SplatSource};
+use super::coded::CodedBlock;
+use super::needs::FileNeeds;
+use super::overview;
+use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};
+use crate::file::promise::share_tolerance;
+use crate::file::{CoefficientFile, DecodedBlock, Prefetch};
+use crate::render::batches::{
+    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest,
+    SampleErrors, Scene, Selection,
+};
+use crate::render::config::{Limit, RenderConfig};
+use crate::render::report::LeftOut;
+use std::sync::{Arc, Mutex, PoisonError};
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
+use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::sample::{magnitude, rounding};
+use wavesplat_core::wavelet::Lane;
+use wavesplat_format::{BlockEntry, BlockStats, PartEntry, PartKind};
+
+/// A coefficient file as a scene.
+pub struct CoefficientScene {
+    file: Arc<CoefficientFile>,
+    what: SplatSource,
+    needs: FileNeeds,
+    /// The frame of each channel up to which parts of a remote file were fetched.
+    fetched: Vec<usize>,
+}
+
+impl CoefficientScene {
+    /// A scene of an open file.
+    pub fn new(file: impl Into<Arc<CoefficientFile>>, what: SplatSource) -> Self {
+        let file = file.into();
+        Self { fetched: vec![0; file.channels()], needs: FileNeeds::new(&file, what), file, what }
+    }
+
+    /// Fetches the bytes of a remote file that the next frames of a request need: all of the first window, and as many
+    /// later windows as fit.
+    fn fetch_ahead(&mut self, request: &BatchRequest<'_>) -> Result<()> {
+        let (channel, config) = (request.channel, request.config);
+        let Some(mut prefetch) = Prefetch::new(&self.file) else { return Ok(()) };
+        if request.frames[0] < self.fetched[channel] {
+            return Ok(());
+        }
+        let later = &config.frames[config.frames.partition_point(|frame| *frame < request.frames[0])..];
+        let region = config.region.unwrap_or(self.file.grid.whole());
+        prefetch.leaves(self.file.by_window(later), channel, &region)?;
+        let fetched = &mut self.fetched[channel];
+        prefetch.gather(self.file.by_window(later), |frames, prefetch| {
+            // In other modes, which blocks are hidden is known later.
+            if config.mode.is_projection() {
+                let batch = CoefficientBatch::open(&self.file, self.what, &BatchRequest { frames, ..*request })?;
+                batch.gather(&batch.selection.blocks, prefetch)?;
+            }
+            *fetched = frames[frames.len() - 1] + 1;
+            Ok(())
+        })?;
+        if config.mode.is_projection() { prefetch.finish() } else { Ok(()) }
+    }
+}
+
+impl From<CoefficientFile> for CoefficientScene {
+    /// Splats the file's coefficients.
+    fn from(file: CoefficientFile) -> Self {
+        Self::new(file, SplatSource::Coefficients)
+    }
+}
+
+impl Scene for CoefficientScene {
+    fn grid(&self) -> &Grid {
+        &self.file.grid
+    }
+
+    fn blocks(&self) -> BlockGrid {
+        self.file.blocks
+    }
+
+    fn channels(&self) -> usize {
+        self.file.channels()
+    }
+
+    fn frames(&self) -> Option<usize> {
+        Some(self.file.frames())
+    }
+
+    fn tolerance(&self) -> Option<f64> {
+        Some(share_tolerance(self.file.metadata()))
+    }
+
+    fn batch_end(&self, frame: usize) -> usize {
+        self.file.window_range(self.file.window_of(frame)).end
+    }
+
+    fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize {
+        if !config.mode.is_projection() {
+            return 2 * frames + 1; // values, not coefficients
+        }
+        self.needs.most_planes(frames, config)
+    }
+
+    fn block_bytes(&self) -> usize {
+        self.needs.block_bytes
+    }
+
+    fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
+        overview::overview(&self.file, request, progress).map(Some)
+    }
+
+    fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
+        self.fetch_ahead(request)?;
+        Ok(Box::new(CoefficientBatch::open(&self.file, self.what, request)?))
+    }
+}
+
+/// A batch of frames of one window of a file.
+pub(super) struct CoefficientBatch<'a> {
+    file: &'a CoefficientFile,
+    window: u32,
+    channel: usize,
+    plan: BatchPlan,
+    views: &'a [Expectation<'a>],
+    selector: BlockSelector,
+    selection: Selection,
+    errors: SampleErrors,
+    /// The last leaf of the directory that was read. Blocks come in order, so most reads hit it.
+    leaf: Mutex<Arc<Vec<BlockEntry>>>,
+}
+
+impl<'a> CoefficientBatch<'a> {
+    fn open(file: &'a CoefficientFile, what: SplatSource, request: &BatchRequest<'a>) -> Result<Self> {
+        let window = file.window_of(request.frames[0]);
+        let plan = BatchPlan::new(file, what, window, request)?;
+        let mut batch = Self {
+            file,
+            window,
+            channel: request.channel,
+            selector: BlockSelector::new(&plan.codec, request.config, &file.grid),
+            plan,
+            views: request.views,
+            selection: Selection::default(),
+            errors: SampleErrors::default(),
+            leaf: Mutex::default(),
+        };
+        batch.select(request.config)?;
+        Ok(batch)
+    }
+
+    /// Selects the parts to read: first decides the rule, then applies it to every block.
+    fn select(&mut self, config: &RenderConfig) -> Result<()> {
+        let region = config.region.unwrap_or(self.file.grid.whole());
+        // Decoded samples are rounded to their type, so the bound for left-out parts would not cover their whole error.
+        if let Some(allowed) = config.allowed.filter(|_| self.plan.what != SplatSource::Samples) {
+            let rule = self.rule(allowed, config.limited, &region)?;
+            self.selector.rule = rule;
+        }
+        let with_ranges = !config.mode.is_projection();
+        let expected = vec![0.0; self.views.len()];
+        let mut found = Selection { empty: self.file.blocks.len() as u64, expected, ..Selection::default() };
+        let mut absolute_sum = 0.0_f64;
+        for entries in self.file.entries(self.window, self.channel, &region) {
+            for entry in entries? {
+                let kept = self.keep(&entry);
+                absolute_sum = absolute_sum.max(self.selector.absolute_sum(&entry));
+                if with_ranges {
+                    found.ranges.push((entry.id.block as usize, self.range(&entry, &kept)));
+                }
+                self.expect(&entry, &kept, &mut found.expected);
+                self.add(&entry, &kept, &mut found);
+            }
+        }
+        if config.certify {
+            self.errors = self.sample_errors(found.certified, absolute_sum);
+        }
+        self.selection = found;
+        Ok(())
+    }
+
+    /// The rule that leaves out as much as the allowed error permits.
+    fn rule(&self, allowed: f64, limited: Limit, region: &Region) -> Result<Rule> {
+        let (Limit::Expected, [view, ..]) = (limited, self.views) else { return Ok(Rule::Within(allowed)) };
+        let mut cheapest = RateAllocator::new(&self.selector);
+        for entries in self.file.entries(self.window, self.channel, region) {
+            entries?.iter().for_each(|entry| cheapest.add(&self.view_of(entry, Some(view))));
+        }
+        Ok(cheapest.within(view.allowed(allowed)))
+    }
+
+    /// Adds a block to a selection.
+    fn add(&self, entry: &BlockEntry, kept: &KeptParts, found: &mut Selection) {
+        found.left_out += kept.left_out;
+        found.other_frames += self.of_other_frames(&kept.entry);
+        found.certified = found.certified.max(kept.certified);
+        found.empty -= u64::from(!entry.parts.is_empty() || entry.lost);
+        if !self.adds_nothing(kept) {
+            found.blocks.push(entry.id.block as usize);
+        }
+    }
+
+    /// A range that holds the samples of a block as splatted.
+    fn range(&self, entry: &BlockEntry, kept: &KeptParts) -> (f64, f64) {
+        let BlockStats { min, max, reached, .. } = entry.stats;
+        // Without all parts, samples differ from the source by `certified`, and the source differs from the stored
+        // range by `reached`.
+        let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
+        let off = off + rounding(self.plan.codec.sample, magnitude((min, max)));
+        (min - off, max + off)
+    }
+
+    /// Adds the expected mean square error that a block causes in each view.
+    fn expect(&self, entry: &BlockEntry, kept: &KeptParts, sums: &mut [f64]) {
+        let [first, others @ ..] = sums else { return };
+        *first += kept.expected;
+        for (sum, view) in others.iter_mut().zip(&self.views[1..]) {
+            *sum += self.selector.keep(&self.view_of(entry, Some(view))).expected;
+        }
+    }
+
+    /// Error bounds of the samples. Every sample in the region has an error of at most `certified` and a sum of
+    /// absolute terms of at most `absolute_sum`.
+    fn sample_errors(&self, certified: f64, absolute_sum: f64) -> SampleErrors {
+        let record = &self.file.metadata().windows[self.window as usize];
+        let range = ((record.min - record.reached).next_down(), (record.max + record.reached).next_up());
+        let frame = FrameBounds {
+            error: record.reached.max(certified),
+            range,
+            // An outlier adds its sample minus the value from the coefficients.
+            absolute_sum: 2.0 * absolute_sum + magnitude(range),
+        };
+        let of_part = |gains: &Vec<f64>| self.plan.frames.iter().map(|f| gains[*f]).collect();
+        let factors = std::iter::once(vec![1.0; self.plan.frames.len()]).chain(self.selector.gains.iter().map(of_part));
+        SampleErrors {
+            factors: factors.take(self.plan.layout.error_planes).collect(),
+            frames: vec![frame; self.plan.frames.len()],
+        }
+    }
+
+    /// The parts of a block to read.
+    fn keep(&self, entry: &BlockEntry) -> KeptParts {
+        self.selector.keep(&self.view_of(entry, self.views.first()))
+    }
+
+    /// A block with its influence on a view; without a view, it influences no pixel.
+    fn view_of<'b>(&self, entry: &'b BlockEntry, view: Option<&Expectation<'_>>) -> BlockView<'b> {
+        let region = self.file.blocks.region(entry.id.block as usize);
+        let influence = view.map(|view| view.of_block(&region)).unwrap_or_default();
+        BlockView { entry, voxels: region.voxels(), influence }
+    }
+
+    /// The parts that the batch's frames do not need.
+    fn of_other_frames(&self, entry: &BlockEntry) -> LeftOut {
+        let needs = |part: &PartEntry| match part.kind {
+            PartKind::Level(level) => self.plan.codec.needs_part(level.into(), &self.plan.wanted),
+            _ => true,
+        };
+        let parts = entry.parts.iter().filter(|part| needs(part)).copied().collect();
+        left_out(entry, &BlockEntry { parts, ..entry.clone() })
+    }
+
+    /// Whether a block adds nothing to any plane.
+    fn adds_nothing(&self, kept: &KeptParts) -> bool {
+        kept.entry.parts.is_empty()
+            && !kept.entry.lost
+            && (self.plan.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
+    }
+
+    /// The entries of the directory's leaf that lists a block.
+    fn leaf_of(&self, block: u32) -> Result<Arc<Vec<BlockEntry>>> {
+        let mut last = self.leaf.lock().unwrap_or_else(PoisonError::into_inner);
+        if !last.iter().any(|entry| entry.id.block == block) {
+            let leaves = self.file.leaves_of(self.window, self.channel);
+            let leaf = &leaves[leaves.partition_point(|l| l.first_block <= block) - 1];
+            *last = Arc::new(self.file.leaf(leaf)?);
+        }
+        Ok(last.clone())
+    }
+
+    /// Looks up a block in the directory, and selects its parts to read.
+    fn kept(&self, block: usize) -> Result<KeptParts> {
+        let leaf = self.leaf_of(block as u32)?;
+        Ok(self.keep(&leaf[block - leaf[0].id.block as usize]))
+    }
+
+    /// Gathers the parts to read of some blocks, in order, until there are as many as should be fetched together.
+    fn gather(&self, blocks: &[usize], prefetch: &mut Prefetch<'_>) -> Result<()> {
+        let BatchPlan { codec, wanted, .. } = &self.plan;
+        for block in blocks {
+            if prefetch.is_full() {
+                break;
+            }
+            prefetch.add(codec, &self.kept(*block)?.entry, wanted);
+        }
+        Ok(())
+    }
+
+    /// Decodes a block, and returns it with the errors of its samples.
+    fn read(&self, block: usize) -> Result<(Arc<DecodedBlock>, Vec<f64>)> {
+        let KeptParts { entry, errors, .. } = self.kept(block)?;
+        let BatchPlan { codec, wanted, what, .. } = &self.plan;
+        let splats_coefficients = *what == SplatSource::Coefficients;
+        Ok((self.file.decoded(codec, &entry, wanted, splats_coefficients)?, errors))
+    }
+}
+
+impl FrameBatch for CoefficientBatch<'_> {
+    fn layout(&self) -> Layout {
+        self.plan.layout
+    }
+
+    fn selection(&self) -> &Selection {
+        &self.selection
+    }
+
+    fn fetch(&self, blocks: &[usize]) -> Result<()> {
+        let Some(mut prefetch) = Prefetch::new(self.file) else { return Ok(()) };
+        self.gather(blocks, &mut prefetch)?;
+        prefetch.finish()
+    }
+
+    fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
+        let (block, errors) = self.read(block)?;
+        Ok(Box::new(CodedBlock::new(&self.plan, block, errors)))
+    }
+
+    fn errors(&self) -> &SampleErrors {
+        &self.errors
+    }
+
+    fn inverse(&self, used: &[usize]) -> Box<Inverse<'_>> {
+        let mut marked = vec![false; self.plan.codec.basis.coefficients()];
+        used.iter().filter(|p| **p < self.plan.layout.coefficients).for_each(|p| marked[self.plan.kept[*p]] = true);
+        let only = self.plan.codec.basis.only(&marked);
+        let places: Vec<usize> = match &only {
+            Some(_) => (0..self.plan.layout.coefficients).filter(|p| marked[self.plan.kept[*p]]).collect(),
+            None => (0..self.plan.layout.coefficients).collect(),
+        };
+        let to: Vec<usize> = if only.is_some() { (0..places.len()).collect() } else { self.plan.kept.clone() };
+        let mut coefficients = vec![Lane::default(); only.as_ref().map_or(marked.len(), |b| b.coefficients())];
+        let mut series = vec![Lane::default(); self.plan.codec.frames()];
+        Box::new(move |planes, frames| {
+            if !places.is_empty() {
+                coefficients.fill(Lane::default());
+                places.iter().zip(&to).for_each(|(plane, k)| coefficients[*k] = planes[*plane]);
+                only.as_deref().unwrap_or(self.plan.codec.basis.as_ref()).inverse(&mut coefficients, &mut series);
+            }
+            for (f, out) in frames.iter_mut().enumerate() {
+                *out = series[self.plan.frames[f]];
+                if self.plan.layout.values {
+                    let value = planes[self.plan.layout.value(f)];
+                    out.iter_mut().zip(value).for_each(|(o, v)| *o += v);
+                }
+            }
+        })
+    }
+
+    fn finish(&self) -> Result<BatchOutcome> {
+        self.file.check_unchanged().map(|()| BatchOutcome::Complete)
+    }
+}

@@ -1,0 +1,80 @@
+//! Pictures one after another in one file.
+
+use super::{PictureFormat, SinkConfig, exr, png};
+use crate::render::{Picture, Pixel, Rendered};
+use std::io::{self, Write};
+use wavesplat_core::base::npy;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::colour::Rgb;
+
+/// Writes the header of a stream.
+pub(super) fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()> {
+    let [width, height] = config.size;
+    match config.format {
+        PictureFormat::Npy if config.coloured_array => {
+            npy::write_header(SampleType::U8, &[config.shown.len(), height, width, 3], out)
+        }
+        PictureFormat::Npy => {
+            let shape = [config.shown.len(), height, width, config.pixel.numbers()];
+            let axes = if config.pixel == Pixel::Value { 3 } else { 4 };
+            npy::write_header(SampleType::F32, &shape[..axes], out)
+        }
+        PictureFormat::Y4m => {
+            let [frames, seconds] = config.frames_and_seconds();
+            writeln!(out, "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=FULL")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes one picture.
+pub(super) fn write(
+    config: &SinkConfig,
+    rendered: &Rendered<'_>,
+    picture: Picture<'_>,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    match config.format {
+        PictureFormat::Npy if !config.coloured_array => {
+            out.write_all(&picture.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
+        }
+        PictureFormat::Gray16 => {
+            let level = |v: &f32| ((config.colours.share(*v) * 65535.0).round() as u16).to_le_bytes();
+            out.write_all(&picture.iter().flat_map(level).collect::<Vec<u8>>())
+        }
+        PictureFormat::Y4m => write_yuv(config.image(rendered, picture), out),
+        PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) | PictureFormat::Page => {
+            out.write_all(config.image(rendered, picture).as_flattened())
+        }
+        PictureFormat::Exr => exr::write(config, &config.texts_of(rendered), picture, out),
+        PictureFormat::Png | PictureFormat::Apng | PictureFormat::Sheet => {
+            png::write(config, config.size, &config.texts_of(rendered), &png::samples(config, rendered, picture), out)
+        }
+    }
+}
+
+fn write_yuv(mut pixels: Vec<Rgb>, out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "FRAME")?;
+    pixels.iter_mut().for_each(|pixel| *pixel = yuv(*pixel));
+    (0..3).try_for_each(|plane| out.write_all(&pixels.iter().map(|p| p[plane]).collect::<Vec<u8>>()))
+}
+
+/// Full-range BT.601, the default of players for streams without colour information.
+fn yuv([r, g, b]: [u8; 3]) -> [u8; 3] {
+    let [r, g, b] = [r, g, b].map(f64::from);
+    let y = 0.299 * r + 0.587 * g + 0.114 * b;
+    let byte = |v: f64| v.round().clamp(0.0, 255.0) as u8;
+    [byte(y), byte(128.0 + (b - y) / 1.772), byte(128.0 + (r - y) / 1.402)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grey_has_no_chroma() {
+        for level in [0, 1, 127, 255] {
+            assert_eq!(yuv([level; 3]), [level, 128, 128]);
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Renders a batch of frames from one view: reads layers of blocks front to back, and adds the slices between them.
+
+use super::layer::Layers;
+use super::needed::{Known, Need};
+use super::probe::Probe;
+use super::row::Blend;
+use super::stops::Stops;
+use super::sweep::{Band, SweepScratch};
+use super::view::{Slice, SlicedView};
+use super::{GROUP, finish};
+use crate::render::batches::{BlockSamples, SampleReader, Units};
+use crate::render::report::{RenderReport, lap};
+use rayon::prelude::*;
+use std::time::Instant;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::BlockGrid;
+
+/// A batch of frames, seen from one view.
+pub(in crate::render) struct SlicePass<'a, B: Blend> {
+    /// The number of the view.
+    pub(in crate::render) number: usize,
+    pub(in crate::render) view: &'a SlicedView,
+    pub(in crate::render) blend: &'a B,
+    /// Where rays end early, if any does.
+    pub(in crate::render) stops: Option<&'a Stops>,
+    pub(in crate::render) reader: &'a SampleReader<'a>,
+}
+
+/// A frame in work.
+struct Frame<B: Blend> {
+    units: Units,
+    layers: Layers,
+    groups: Vec<B::Group>,
+    limits: Vec<f32>,
+}
+
+impl<B: Blend> Frame<B> {
+    fn new(view: &SlicedView, most: usize, units: Units) -> Self {
+        let groups = groups(view);
+        Self { units, layers: Layers::new(view, most), groups: vec![B::EMPTY; groups], limits: vec![B::OPEN; groups] }
+    }
+}
+
+/// The number of groups of cells of a view.
+fn groups(view: &SlicedView) -> usize {
+    view.extent[0] / GROUP * view.extent[1] * view.cells * view.cells
+}
+
+/// The largest number of voxel layers at a time: those of a layer of blocks, and those before that slices still need.
+fn most_layers(view: &SlicedView, blocks: BlockGrid) -> usize {
+    (blocks.edges[view.shear.axes[2]] + 2 * (view.reach[2] + view.margin)).min(view.count[2])
+}
+
+/// Bytes of a batch of `frames` frames without decoded blocks.
+pub(in crate::render) fn bytes<B: Blend>(
+    view: &SlicedView,
+    frames: usize,
+    blocks: BlockGrid,
+    is_shaded: bool,
+) -> usize {
+    let layers = Layers::bytes(view, most_layers(view, blocks));
+    let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
+    let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
+    let sweep = rayon::current_num_threads() * SweepScratch::bytes(view, rows_of_band(view), is_shaded);
+    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLICES * Slice::bytes(view)
+}
+
+/// Rows of each band.
+fn rows_of_band(view: &SlicedView) -> usize {
+    let bands = rayon::current_num_threads().min(view.extent[1] / LEAST_ROWS).max(1);
+    view.extent[1].div_ceil(bands)
+}
+
+impl<B: Blend> SlicePass<'_, B> {
+    /// The pictures of all frames, one after another.
+    pub(in crate::render) fn pictures(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
+        let SampleReader { batch, blocks, progress, .. } = *self.reader;
+        let known = Known::new(self.view, blocks, batch.selection());
+        let (units, most) = (self.units(&known)?, most_layers(self.view, blocks));
+        let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
+        let mut probe = (report.views[self.number].probed.is_none() && self.stops.is_none())
+            .then(|| Probe::new(self.view, self.blend));
+        let mut next = 0;
+        for layer in self.layers() {
+            let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
+            let mut clock = Instant::now();
+            frames.iter_mut().for_each(|frame| frame.layers.advance(self.view.first_needed(next), met));
+            self.read(&known, layer, &mut frames, report)?;
+            lap(&mut clock, &mut report.decode_seconds);
+            let ready = self.view.ready(next, met);
+            next = ready.end;
+            for first in ready.clone().step_by(SLICES) {
+                let numbers = first..ready.end.min(first + SLICES);
+                let slices: Vec<Slice> = numbers.filter_map(|number| self.view.slice(number)).collect();
+                frames.par_iter_mut().for_each(|frame| self.add(&slices, frame));
+            }
+            if let (Some(probe), Some(frame)) = (&mut probe, frames.first()) {
+                probe.add(self.blend, &frame.units, &frame.layers, met);
+            }
+            lap(&mut clock, &mut report.splat_seconds);
+            progress.advance((ready.len() * units.len()) as u64);
+        }
+        progress.advance(((self.view.slices() - next) * units.len()) as u64);
+        let mut clock = Instant::now();
+        let pictures = self.finish(&frames);
+        report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
+        lap(&mut clock, &mut report.inverse_seconds);
+        Ok(pictures)
+    }
+
+    /// The first and the last voxel along a of each layer of blocks, in the order in which rays meet them.
+    fn layers(&self) -> Vec<[usize; 2]> {
+        let (axis, clip) = (self.view.shear.axes[2], &self.view.clip);
+        let edge = self.reader.blocks.edges[axis];
+        if self.view.extent.contains(&0) {
+            return Vec::new();
+        }
+        let (first, last) = (clip.start[axis], clip.end[axis] - 1);
+        let ends = |n: usize| [(n * edge).max(first), (n * edge + edge - 1).min(last)];
+        let layers = first / edge..last / edge + 1;
+        if self.view.is_reversed() { layers.rev().map(ends).collect() } else { layers.map(ends).collect() }
+    }
+
+    /// The units of each frame.
+    fn units(&self, known: &Known<'_>) -> Result<Vec<Units>> {
+        let frames = self.reader.batch.layout().frames;
+        match known.middle() {
+            Some(middle) => Ok(vec![self.blend.units(middle); frames]),
+            None if B::CENTRED => self.middles(frames),
+            None => Ok(vec![self.blend.units(0.0); frames]),
+        }
+    }
+
+    /// Units around the middle of the first block of each frame that has any sample.
+    fn middles(&self, frames: usize) -> Result<Vec<Units>> {
+        let mut middles = vec![None; frames];
+        for block in &self.reader.batch.selection().blocks {
+            let all = self.reader.read_one(*block, &vec![Units { zero: 0.0, per: 1.0 / 16.0 }; frames])?;
+            for (middle, samples) in middles.iter_mut().zip(all).filter(|(middle, _)| middle.is_none()) {
+                let present = || samples.iter().copied().filter(|sample| !sample.is_nan());
+                let ends = [present().fold(f32::INFINITY, f32::min), present().fold(f32::NEG_INFINITY, f32::max)];
+                *middle = (ends[0] <= ends[1]).then(|| 16.0 * (f64::from(ends[0]) + f64::from(ends[1])) / 2.0);
+            }
+            if middles.iter().all(Option::is_some) {
+                break;
+            }
+        }
+        Ok(middles.into_iter().map(|middle| self.blend.units(middle.unwrap_or(0.0))).collect())
+    }
+
+    /// Reads the blocks of a layer that are needed, and fills the others with one value.
+    fn read(
+        &self,
+        known: &Known<'_>,
+        [first, last]: [usize; 2],
+        frames: &mut [Frame<B>],
+        report: &mut RenderReport,
+    ) -> Result<()> {
+        let (view, axis, blocks) = (self.view, self.view.shear.axes[2], self.reader.blocks);
+        let units: Vec<Units> = frames.iter().map(|frame| frame.units).collect();
+        let mut region = view.clip;
+        (region.start[axis], region.end[axis]) = (first, last + 1);
+        let limits: Vec<&[f32]> = frames.iter().map(|frame| frame.limits.as_slice()).collect();
+        let need = |block: usize| (block, known.need(self.blend, &units[0], &limits, block));
+        let needs: Vec<(usize, Need)> = blocks.touching(&region).map(need).collect();
+        let (read, others): (Vec<_>, Vec<_>) = needs.into_iter().partition(|(_, need)| *need == Need::Read);
+        for (block, need) in others {
+            let region = blocks.region(block);
+            match need {
+                Need::Read => {}
+                Need::Missing => report.blocks_transparent += 1,
+                Need::Fill(_) => report.blocks_transparent += 1,
+                Need::Hidden(_) => report.blocks_hidden += 1,
+            }
+            let fill = |units: &Units| match need {
+                Need::Fill(value) | Need::Hidden(value) => units.number(value),
+                Need::Read | Need::Missing => f32::NAN,
+            };
+            frames.par_iter_mut().for_each(|frame| frame.layers.fill(view, &region, fill(&frame.units)));
+        }
+        let read: Vec<usize> = read.into_iter().map(|(block, _)| block).collect();
+        let stats = self.reader.read(&read, &units, |read: &[BlockSamples]| {
+            frames.par_iter_mut().enumerate().for_each(|(n, frame)| {
+                read.iter().for_each(|(region, samples)| frame.layers.put(view, region, &samples[n]));
+            });
+        })?;
+        report.count_read(&stats);
+        frames.par_iter_mut().for_each(|frame| frame.layers.seal(view.count[0]));
+        Ok(())
+    }
+
+    /// Adds slices to all cells of a frame, in bands of rows.
+    fn add(&self, slices: &[Slice], frame: &mut Frame<B>) {
+        let view = self.view;
+        let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
+        let chunks = frame.groups.par_chunks_mut(rows * of_row).zip(frame.limits.par_chunks_mut(rows * of_row));
+        chunks.enumerate().for_each(|(n, (groups, limits))| {
+            let scratch = SweepScratch::new(view, rows, self.blend.is_shaded());
+            let rows = n * rows..((n + 1) * rows).min(view.extent[1]);
+            let first = n * rows_of_band(view) * of_row;
+            let stops = self.stops.map_or(&[][..], |stops| stops.groups(first..first + groups.len()));
+            let mut band = Band { view, blend: self.blend, rows, groups, limits, stops, scratch };
+            slices.iter().for_each(|slice| band.add(slice, &frame.layers));
+        });
+    }
+
+    fn finish(&self, frames: &[Frame<B>]) -> Vec<f32> {
+        let [width, height] = self.view.camera.size;
+        let mut pictures = vec![0.0; frames.len() * width * height * B::NUMBERS];
+        let of_frames = pictures.chunks_exact_mut(width * height * B::NUMBERS).zip(frames);
+        of_frames.for_each(|(picture, frame)| finish::finish::<B>(self.view, &frame.units, &frame.groups, picture));
+        pictures
+    }
+}
+
+/// Slices that are weighed at a time.
+const SLICES: usize = 32;
+
+/// The least rows of a band: the rows at its edges are filtered for both bands.
+const LEAST_ROWS: usize = 32;

@@ -1,0 +1,267 @@
+//! How much of its cell a point of a surface covers: less than all of it at silhouettes, and at the faces of the volume.
+//!
+//! Both edges are found from the field alone, to first order. With D the change of the field along the ray, D' the change
+//! of D, and G its change across the lattice, a ray that crosses a surface turns back a height of D^2 / 2|D'| beyond it.
+//! That height changes by G from cell to cell, so their ratio is the distance of the silhouette. The distance of a face
+//! changes from cell to cell as the point of the ray on the surface moves.
+//!
+//! ```text
+//! share of a cell = 1/2 + height / (G width of a cell), from 0 to 1                                       (eq 43)
+//! ```
+
+use super::GROUP;
+use super::filter::Sixteen;
+use super::view::SlicedView;
+use wavesplat_core::base::vectors::dispatch;
+
+/// The field at a point of a ray.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct CoverPoint {
+    /// Voxels along b, c and a, from the first ones; those along a are counted along the ray.
+    pub(super) at: [f32; 3],
+    pub(super) value: f32,
+    /// The change of the value per voxel.
+    pub(super) gradient: [f32; 3],
+}
+
+/// The field at sixteen cells of a slice; NaN where there is none.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Slope {
+    pub(super) values: Sixteen,
+    pub(super) gradient: [Sixteen; 3],
+}
+
+impl Slope {
+    /// No field.
+    pub(super) const NOTHING: Self = Self { values: [f32::NAN; GROUP], gradient: [[0.0; GROUP]; 3] };
+
+    /// The field at a cell whose place is `at`.
+    pub(super) fn point(&self, i: usize, at: [f32; 3]) -> CoverPoint {
+        CoverPoint { at, value: self.values[i], gradient: self.gradient.map(|along| along[i]) }
+    }
+}
+
+/// A point of a ray at which a surface shows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Meeting {
+    pub(super) gradient: [f32; 3],
+    /// The share of the cell that the surface covers.
+    covered: f32,
+    sheets: Sheets,
+}
+
+/// Which sheets of a surface a ray passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Sheets {
+    One,
+    /// The second of two sheets that are close together: it hides behind the first.
+    Second,
+    Both,
+}
+
+impl Meeting {
+    /// The opacity of the cell for a surface of some opacity.
+    pub(super) fn opacity(&self, of_surface: f32) -> f32 {
+        let first = self.covered * of_surface;
+        match self.sheets {
+            Sheets::One => first,
+            Sheets::Second => first * (1.0 - of_surface) / (1.0 - first).max(f32::MIN_POSITIVE),
+            Sheets::Both => first * (2.0 - of_surface),
+        }
+    }
+}
+
+/// Rays of a view, and the box in which surfaces are seen: half a voxel beyond the outermost voxels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rays {
+    /// Voxels that a ray passes from one voxel along a to the next.
+    pub(super) direction: [f32; 3],
+    /// The distance of two slices in voxels along a.
+    pub(super) between: f32,
+    /// The width of a cell in voxels.
+    pub(super) width: f32,
+    /// Voxels of the volume.
+    count: [f32; 3],
+}
+
+/// A wider cell would be covered by voxels that were not looked at.
+const WIDEST: f64 = 2.0;
+/// A point this many voxels away from a face is not cut by it.
+const FAR: f32 = 2.0;
+
+impl Rays {
+    pub(super) fn new(view: &SlicedView) -> Self {
+        Self {
+            direction: view.direction().map(|n| n as f32),
+            between: view.between() as f32,
+            width: view.grain().min(WIDEST) as f32,
+            count: view.count.map(|n| n as f32),
+        }
+    }
+
+    /// The change of the field along the ray, per voxel along a.
+    #[inline(always)]
+    pub(super) fn rise(&self, gradient: &[f32; 3]) -> f32 {
+        gradient[0] * self.direction[0] + gradient[1] * self.direction[1] + gradient[2]
+    }
+
+    /// Where a ray meets the surface of a value between two points, if it does.
+    pub(super) fn meeting(&self, value: f32, from: &CoverPoint, to: &CoverPoint) -> Option<Meeting> {
+        let rises = [from, to].map(|place| self.rise(&place.gradient));
+        let bend = (rises[1] - rises[0]) / (to.at[2] - from.at[2]);
+        let share = rises[0] / (rises[0] - rises[1]);
+        let turn = (rises[0] * rises[1] < 0.0).then(|| turning_value(from, to, rises, share));
+        let meeting = if (from.value < value) != (to.value < value) {
+            let place = between(from, to, (value - from.value) / (to.value - from.value));
+            let is_turn_behind = self.rise(&place.gradient) * bend > 0.0;
+            let (end, rise) = if is_turn_behind { (from, rises[0]) } else { (to, rises[1]) };
+            let beyond = || (end.value - value).abs() + rise * rise / (2.0 * bend.abs());
+            let height = turn.map_or_else(beyond, |turn| (turn - value).abs());
+            let covered = self.of_height(height, &place.gradient);
+            let sheets = if is_turn_behind && covered < 1.0 { Sheets::Second } else { Sheets::One };
+            Meeting { gradient: place.gradient, covered: covered * self.within(&place, bend), sheets }
+        } else {
+            let turn = turn.filter(|_| (rises[0] > 0.0) == (from.value < value))?;
+            let place = between(from, to, share);
+            let height = if rises[0] > 0.0 { turn - value } else { value - turn };
+            let covered = self.of_height(height, &place.gradient) * self.within(&place, bend);
+            Meeting { gradient: place.gradient, covered, sheets: Sheets::Both }
+        };
+        (meeting.covered > 0.0).then_some(meeting)
+    }
+
+    /// Marks the cells in which one of the surfaces may show between two slices.
+    pub(super) fn near(&self, values: &[f32], from: &Slope, to: &Slope) -> [bool; GROUP] {
+        values.iter().fold([false; GROUP], |marked, value| {
+            let near = dispatch!(near(from, to, *value, self));
+            std::array::from_fn(|i| marked[i] || near[i])
+        })
+    }
+
+    /// The share of a cell that a surface covers if the ray turns back at `height` beyond it. The height is negative if
+    /// the ray turns back before the surface.
+    pub(super) fn of_height(&self, height: f32, gradient: &[f32; 3]) -> f32 {
+        share(height, self.width * length([gradient[0], gradient[1]]))
+    }
+
+    /// The share of a cell of a surface within the box. `bend` is the change of the rise along the ray.
+    pub(super) fn within(&self, place: &CoverPoint, bend: f32) -> f32 {
+        let distance = |axis: usize| (place.at[axis] + 0.5).min(self.count[axis] - 0.5 - place.at[axis]);
+        let near = |axis: &usize| distance(*axis) < FAR;
+        let shares = (0..3).filter(near).map(|axis| self.of_face(axis, distance(axis), place, bend));
+        shares.fold(1.0, f32::min)
+    }
+
+    /// The share of a cell on this side of a face across an axis.
+    fn of_face(&self, axis: usize, distance: f32, place: &CoverPoint, bend: f32) -> f32 {
+        let ([b, c, _], rise) = (place.gradient, self.rise(&place.gradient));
+        // From cell to cell, the point on the surface moves along the ray by -(b, c) / rise.
+        let moved = match axis {
+            0 => [rise - self.direction[0] * b, -self.direction[0] * c],
+            1 => [-self.direction[1] * b, rise - self.direction[1] * c],
+            _ => [b, c],
+        };
+        // At silhouettes this has no limit, but the next cell is beyond the silhouette.
+        let least = (2.0 * bend.abs() * self.width * length([b, c])).sqrt();
+        share(distance * rise.abs().max(least), self.width * length(moved))
+    }
+}
+
+/// The field between two points, by linear interpolation.
+fn between(from: &CoverPoint, to: &CoverPoint, share: f32) -> CoverPoint {
+    let mix = |a: f32, b: f32| a + share * (b - a);
+    CoverPoint {
+        at: std::array::from_fn(|i| mix(from.at[i], to.at[i])),
+        value: mix(from.value, to.value),
+        gradient: std::array::from_fn(|i| mix(from.gradient[i], to.gradient[i])),
+    }
+}
+
+/// The value at a share of the way, by the cubic that has the values and the rises of both ends.
+fn turning_value(from: &CoverPoint, to: &CoverPoint, rises: [f32; 2], share: f32) -> f32 {
+    let (rest, length) = (1.0 - share, to.at[2] - from.at[2]);
+    let ends = rest * rest * (1.0 + 2.0 * share) * from.value + share * share * (3.0 - 2.0 * share) * to.value;
+    ends + length * share * rest * (rest * rises[0] - share * rises[1])
+}
+
+/// Whether a value may be passed, or almost reached, between two slices.
+#[inline(always)]
+fn near(from: &Slope, to: &Slope, value: f32, rays: &Rays) -> [bool; GROUP] {
+    let mut marks = [false; GROUP];
+    for (i, mark) in marks.iter_mut().enumerate() {
+        let [first, last] = [from, to].map(|slope| {
+            slope.gradient[2][i] + rays.direction[0] * slope.gradient[0][i] + rays.direction[1] * slope.gradient[1][i]
+        });
+        let across = |slope: &Slope| slope.gradient[0][i].abs() + slope.gradient[1][i].abs();
+        // The height at which a ray turns back, and what the next cell may be higher.
+        let reached = 0.5 * rays.between * (first.abs() + last.abs()) + 0.5 * rays.width * across(from).max(across(to));
+        let (a, b) = (from.values[i] - value, to.values[i] - value);
+        let turns = first * last < 0.0 && a.abs().min(b.abs()) <= reached;
+        *mark = turns || (a < 0.0) != (b < 0.0);
+    }
+    marks
+}
+
+/// Half, and a number of widths more; from 0 to 1.
+fn share(number: f32, width: f32) -> f32 {
+    let share = 0.5 + number / width.max(f32::MIN_POSITIVE);
+    if share.is_nan() { 1.0 } else { share.clamp(0.0, 1.0) }
+}
+
+fn length([b, c]: [f32; 2]) -> f32 {
+    (b * b + c * c).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1.
+    struct Random(u32);
+
+    impl Random {
+        fn next(&mut self) -> f32 {
+            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (self.0 >> 8) as f32 / 8_388_608.0 - 1.0
+        }
+
+        fn slope(&mut self, size: f32) -> Slope {
+            let mut sixteen = |size: f32| std::array::from_fn(|_| size * self.next());
+            Slope { values: sixteen(1.0), gradient: [size, size, size].map(&mut sixteen) }
+        }
+    }
+
+    /// Cells are marked fast by a bound, and surfaces found one by one.
+    #[test]
+    fn every_cell_with_a_surface_is_marked() {
+        let (mut random, mut shown, mut unmarked) = (Random(1), 0, 0);
+        for n in 0..4000 {
+            let (between, width) = ([0.125, 0.5, 1.0][n % 3], [0.25, 0.5, 2.0][n / 3 % 3]);
+            let direction = [random.next(), random.next(), 1.0];
+            let rays = Rays { direction, between, width, count: [40.0; 3] };
+            let (from, to) = (random.slope(3.0), random.slope(3.0));
+            let values = [random.next(), 2.0 * random.next()];
+            let marks = rays.near(&values, &from, &to);
+            for (i, mark) in marks.into_iter().enumerate() {
+                let [first, last] = [[9.0; 3], [9.0, 9.0, 9.0 + between]];
+                let met = |value: &f32| rays.meeting(*value, &from.point(i, first), &to.point(i, last)).is_some();
+                let any = values.iter().any(met);
+                assert!(mark || !any, "{n} {i}");
+                shown += u32::from(any);
+                unmarked += u32::from(!mark);
+            }
+        }
+        assert!(shown > 10_000 && unmarked > 10_000, "{shown} {unmarked}");
+    }
+
+    #[test]
+    fn two_sheets_let_the_light_of_both_through() {
+        for (covered, opacity) in [(0.3, 0.4), (0.9, 0.7), (0.6, 1.0), (1.0, 0.5)] {
+            let opacity_of = |sheets| Meeting { gradient: [0.0; 3], covered, sheets }.opacity(opacity);
+            let through = (1.0 - opacity_of(Sheets::One)) * (1.0 - opacity_of(Sheets::Second));
+            let both = 1.0 - opacity_of(Sheets::Both);
+            let expected = 1.0 - covered + covered * (1.0 - opacity) * (1.0 - opacity);
+            assert!((through - expected).abs() < 1e-6 && (both - expected).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The blocks that a batch must read: those near which a value may be visible.
+
+use super::row::Blend;
+use super::view::SlicedView;
+use crate::render::batches::{Selection, Units};
+use wavesplat_core::base::grid::BlockGrid;
+
+/// Facts about the blocks of a batch, known before any block is read.
+pub(super) struct Known<'a> {
+    view: &'a SlicedView,
+    blocks: BlockGrid,
+    /// A range that holds the samples of each block; inverted if all are missing.
+    ranges: Vec<(f64, f64)>,
+    /// The same of each block together with the blocks that the kernel reaches.
+    wide: Vec<(f64, f64)>,
+    /// Whether a block has values other than zero.
+    has_values: Vec<bool>,
+}
+
+/// What to do with a block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Need {
+    Read,
+    /// All samples have this value; or none is visible, and this is some value of the block's range.
+    Fill(f64),
+    /// The same for a block that no open cell needs.
+    Hidden(f64),
+    /// All samples are missing.
+    Missing,
+}
+
+const INVERTED: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
+impl<'a> Known<'a> {
+    pub(super) fn new(view: &'a SlicedView, blocks: BlockGrid, selection: &Selection) -> Self {
+        let (mut ranges, mut has_values) = (vec![INVERTED; blocks.len()], vec![false; blocks.len()]);
+        selection.ranges.iter().for_each(|(block, range)| ranges[*block] = *range);
+        selection.blocks.iter().for_each(|block| has_values[*block] = true);
+        let mut wide = ranges.clone();
+        for (i, axis) in view.shear.axes.into_iter().enumerate() {
+            widen(&mut wide, blocks, axis, (2 * (view.reach[i] + view.margin) - 1).div_ceil(blocks.edges[axis]));
+        }
+        Self { view, blocks, ranges, wide, has_values }
+    }
+
+    /// The middle of all values, if it is known.
+    pub(super) fn middle(&self) -> Option<f64> {
+        let all = self.ranges.iter().fold(INVERTED, |all, range| (all.0.min(range.0), all.1.max(range.1)));
+        let middle = all.0 / 2.0 + all.1 / 2.0;
+        if all.0 > all.1 { Some(0.0) } else { Some(middle).filter(|middle| middle.is_finite()) }
+    }
+
+    /// What to do with a block. `limits` are those of all frames.
+    pub(super) fn need<B: Blend>(&self, blend: &B, units: &Units, limits: &[&[f32]], block: usize) -> Need {
+        let (view, own, wide) = (self.view, self.ranges[block], self.wide[block]);
+        if own.0 > own.1 {
+            return Need::Missing;
+        }
+        let any = own.0.max(f64::MIN).min(own.1);
+        if !self.has_values[block] {
+            return Need::Fill(0.0);
+        }
+        if !blend.shows((units.number(wide.0), units.number(wide.1))) {
+            return Need::Fill(any);
+        }
+        let [columns, rows] = view.reached(&self.blocks.region(block).intersect(&view.clip));
+        let of_row = view.cells * view.cells;
+        let width = view.extent[0] / super::GROUP;
+        let is_open = |limits: &[f32], row: usize| {
+            let phase = |phase: usize| &limits[(row * of_row + phase) * width..][columns.clone()];
+            (0..of_row).any(|n| phase(n).iter().any(|limit| !B::is_closed(*limit)))
+        };
+        let open = limits.iter().any(|limits| rows.clone().any(|row| is_open(limits, row)));
+        if open { Need::Read } else { Need::Hidden(any) }
+    }
+}
+
+/// Joins the ranges of every block with those of the `reach` blocks before and behind it along an axis.
+fn widen(ranges: &mut [(f64, f64)], blocks: BlockGrid, axis: usize, reach: usize) {
+    let (counts, before) = (blocks.counts(), ranges.to_vec());
+    let stride: usize = counts[..axis].iter().product();
+    for (block, range) in ranges.iter_mut().enumerate() {
+        let at = block / stride % counts[axis];
+        for other in at.saturating_sub(reach)..(at + reach + 1).min(counts[axis]) {
+            let (lo, hi) = before[block - at * stride + other * stride];
+            *range = (range.0.min(lo), range.1.max(hi));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_widen_to_the_blocks_around() {
+        let blocks = BlockGrid::cubes([20, 12, 8], 4);
+        let mut ranges: Vec<(f64, f64)> = (0..blocks.len()).map(|n| (n as f64, n as f64)).collect();
+        (0..3).for_each(|axis| widen(&mut ranges, blocks, axis, 1));
+        for (block, found) in ranges.into_iter().enumerate() {
+            let at = |n: usize| [n % 5, n / 5 % 3, n / 15];
+            let near = |n: &usize| (0..3).all(|a| at(*n)[a].abs_diff(at(block)[a]) <= 1);
+            let all: Vec<usize> = (0..blocks.len()).filter(near).collect();
+            assert_eq!(found, (all[0] as f64, all[all.len() - 1] as f64));
+        }
+    }
+}

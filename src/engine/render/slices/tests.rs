@@ -1,0 +1,298 @@
+//! Pictures against brute force: the field of the kernels, sampled along the ray of every pixel at small steps.
+
+use crate::render::{FrameScene, Mode, RenderConfig, RenderReport, Rendered, Surface, render};
+use lit::LAMP;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::{Grid, Region};
+use wavesplat_core::base::progress::Silent;
+use wavesplat_core::base::sample::{SampleType, store};
+use wavesplat_core::colour::TransferFunction;
+use wavesplat_core::source::ArraySource;
+use wavesplat_core::view::camera::{Camera, View};
+
+mod edges;
+mod lit;
+
+/// A volume in one view.
+#[derive(Clone)]
+struct Case {
+    grid: Grid,
+    values: Vec<f64>,
+    view: View,
+    region: Option<Region>,
+    sigma: f64,
+}
+
+fn grid(dims: [usize; 3]) -> Grid {
+    Grid { dims, spacing: [1.0; 3], origin: [3.0, -2.0, 10.0] }
+}
+
+/// A smooth field between about 0 and 1.
+fn smooth(grid: &Grid) -> Vec<f64> {
+    let value = |[x, y, z]: [usize; 3]| {
+        let [x, y, z] = [x as f64, y as f64, z as f64];
+        0.5 + 0.25 * (0.5 * x + 0.3 * y).sin() + 0.2 * (0.45 * z - 0.35 * y + 1.0).cos()
+    };
+    grid.whole().iter().map(value).collect()
+}
+
+fn view(azimuth: f64, elevation: f64, roll: f64) -> View {
+    View { roll, size: [40, 36], ..View::new(azimuth, elevation) }
+}
+
+fn case(dims: [usize; 3], view: View) -> Case {
+    let grid = grid(dims);
+    Case { values: smooth(&grid), view, region: None, sigma: 0.75, grid }
+}
+
+const TOP: f64 = 0.3;
+
+fn transfer() -> TransferFunction {
+    let viridis = TransferFunction::open("viridis").expect("a map");
+    viridis.with_opacity(&[(0.0, 0.0), (1.0, TOP)]).expect("points").over((0.1, 1.0)).expect("a range")
+}
+
+fn composite(slices: Option<usize>) -> Mode {
+    Mode::Composite { transfer: transfer(), unit: None, slices, light: None, planes: Vec::new() }
+}
+
+impl Case {
+    fn config(&self, scene: &FrameScene, mode: Mode) -> RenderConfig {
+        let mut config = RenderConfig { mode, region: self.region, ..RenderConfig::new(scene, self.view) };
+        config.kernel.sigma = self.sigma;
+        config
+    }
+
+    fn scene(&self) -> FrameScene {
+        let mut bytes = vec![0; self.values.len() * 8];
+        store(SampleType::F64, &self.values, &mut bytes);
+        let source = ArraySource::new(self.grid, SampleType::F64, bytes).expect("whole frames");
+        FrameScene::new(Box::new(source), None)
+    }
+
+    fn picture(&self, mode: Mode) -> Vec<f32> {
+        self.rendered(mode).0
+    }
+
+    fn rendered(&self, mode: Mode) -> (Vec<f32>, RenderReport) {
+        let mut scene = self.scene();
+        let config = self.config(&scene, mode);
+        let mut found = Vec::new();
+        let mut take = |rendered: Rendered<'_>| -> Result<()> {
+            found.extend_from_slice(rendered.picture);
+            Ok(())
+        };
+        let report = render(&mut scene, &config, &Silent, &mut take).expect("a picture");
+        (found, report)
+    }
+
+    /// For each pixel, the density and the mean at every step along its ray, front to back.
+    fn rays(&self, step: f64, least: f64) -> Vec<Vec<(f64, f64)>> {
+        let camera = Camera::new(&self.view, &self.grid).expect("a view");
+        let clip = self.region.unwrap_or(self.grid.whole());
+        let voxels: Vec<([f64; 3], f64)> = clip
+            .iter()
+            .map(|voxel| (camera.project(self.grid.position(voxel)), self.values[self.grid.whole().index(voxel)]))
+            .filter(|(_, value)| !value.is_nan())
+            .collect();
+        let cell: f64 = self.grid.spacing.iter().product();
+        let peak = cell / ((2.0 * std::f64::consts::PI).sqrt() * self.sigma).powi(3);
+        let ends = voxels.iter().fold([f64::MAX, f64::MIN], |e, (p, _)| [e[0].min(p[2]), e[1].max(p[2])]);
+        let count = ((ends[1] - ends[0] + 8.0 * self.sigma) / step).ceil() as usize;
+        let gauss = |off: f64| (-0.5 * (off / self.sigma).powi(2)).exp();
+        let of_pixel = |pixel: usize| {
+            let at = [pixel % self.view.size[0], pixel / self.view.size[0]].map(|n| n as f64 + 0.5);
+            let mut sums = vec![(0.0, 0.0); count];
+            for (p, value) in &voxels {
+                let across = peak * gauss((p[0] - at[0]).hypot(p[1] - at[1]) / camera.scale);
+                let first = ((p[2] - ends[0]) / step) as usize; // kernels reach 4 sigma to both sides
+                let last = (first as f64 + 8.0 * self.sigma / step).ceil() as usize + 1;
+                for n in (first..last.min(count)).filter(|_| across > 1e-9 * peak) {
+                    let weight = across * gauss(ends[0] - 4.0 * self.sigma + (n as f64 + 0.5) * step - p[2]);
+                    sums[n] = (sums[n].0 + weight, sums[n].1 + weight * value);
+                }
+            }
+            sums.into_iter().filter(|(density, _)| *density > least).map(|(d, sum)| (d, sum / d)).collect()
+        };
+        (0..self.view.size.iter().product()).map(of_pixel).collect()
+    }
+
+    /// Light and opacity of every pixel.
+    fn light(&self) -> Vec<f64> {
+        let (step, transfer) = (self.grid.spacing.iter().copied().fold(f64::MAX, f64::min) / 8.0, transfer());
+        let unit = self.grid.largest_spacing();
+        let pixel = |ray: &Vec<(f64, f64)>| {
+            let (mut light, mut through) = ([0.0; 3], 1.0);
+            for (density, mean) in ray {
+                let passed = (1.0 - transfer.opacity(*mean)).powf(density * step / unit);
+                let colour = transfer.colour(*mean).expect("a colour");
+                light.iter_mut().zip(colour).for_each(|(sum, c)| *sum += through * (1.0 - passed) * c);
+                through *= passed;
+            }
+            [light[0], light[1], light[2], 1.0 - through]
+        };
+        self.rays(step, 1e-6).iter().flat_map(pixel).collect()
+    }
+
+    /// The largest value of every pixel; NaN without any.
+    fn largest(&self, least: f64) -> Vec<f64> {
+        let pixel = |ray: &Vec<(f64, f64)>| ray.iter().map(|(_, mean)| *mean).fold(f64::NAN, f64::max);
+        self.rays(0.125, least).iter().map(pixel).collect()
+    }
+
+    /// Asserts that a composite is within a root mean square and a largest difference of brute force.
+    fn check(&self, name: &str, rms: f64, most: f64) {
+        let (found, expected) = (self.picture(composite(None)), self.light());
+        let off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
+        assert!(expected.iter().any(|e| *e > 0.2) && found.len() == expected.len());
+        let (found_rms, largest) = errors(&off);
+        assert!(found_rms < rms && largest < most, "{name}: rms {found_rms:e}, largest {largest:e}");
+    }
+}
+
+fn errors(off: &[f64]) -> (f64, f64) {
+    let squares: f64 = off.iter().map(|off| off * off).sum();
+    ((squares / off.len() as f64).sqrt(), off.iter().copied().fold(0.0, f64::max))
+}
+
+/// Each principal axis, from both ends.
+fn views() -> Vec<View> {
+    let angles =
+        [(30.0, 25.0, 0.0), (200.0, -20.0, 40.0), (75.0, 15.0, -30.0), (-100.0, 20.0, 0.0), (20.0, 70.0, 10.0)];
+    let angles = angles.into_iter().chain([(50.0, -65.0, 0.0), (0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 90.0)]);
+    angles.map(|(azimuth, elevation, roll)| view(azimuth, elevation, roll)).collect()
+}
+
+#[test]
+fn composites_are_those_of_brute_force_along_every_axis() {
+    for view in views() {
+        let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
+        // Where rays run along faces, the lattice of cells shows at the silhouette.
+        let along_faces = view.azimuth % 90.0 == 0.0 && view.elevation % 90.0 == 0.0;
+        let (rms, most) = if along_faces { (2e-3, 1e-2) } else { (5e-4, 6e-3) };
+        case([18, 15, 13], view).check(&name, rms, most);
+    }
+}
+
+#[test]
+fn composites_of_long_voxels_are_those_of_brute_force() {
+    for view in views() {
+        let mut case = case([14, 15, 11], view);
+        (case.grid.spacing, case.sigma) = ([1.0, 0.6, 1.4], 0.75 * 1.4);
+        case.check(&format!("{} {} {}", view.azimuth, view.elevation, view.roll), 5e-4, 6e-3);
+    }
+}
+
+#[test]
+fn composites_of_parts_holes_and_thin_volumes_are_those_of_brute_force() {
+    let region = Some(Region { start: [3, 2, 1], end: [17, 9, 12] });
+    for view in [view(30.0, 25.0, 0.0), view(75.0, 15.0, 0.0), view(20.0, -70.0, 0.0)] {
+        let whole = case([18, 15, 13], view);
+        Case { region, ..whole.clone() }.check("region", 5e-4, 6e-3);
+        let mut holes = whole.clone();
+        let hole = |p: [usize; 3]| (0..3).map(|a| (p[a] as f64 - 7.0).powi(2)).sum::<f64>() < 16.0;
+        let voxels = holes.grid.whole().iter();
+        holes.values.iter_mut().zip(voxels).filter(|(_, p)| hole(*p)).for_each(|(value, _)| *value = f64::NAN);
+        holes.check("hole", 8e-4, 1e-2);
+        for dims in [[1, 15, 13], [18, 1, 13], [18, 15, 1], [2, 3, 2]] {
+            case(dims, view).check(&format!("{dims:?}"), 5e-4, 6e-3);
+        }
+    }
+}
+
+#[test]
+fn finer_slices_and_cells_come_nearer_to_brute_force() {
+    let case = case([18, 15, 13], view(30.0, 25.0, 20.0));
+    let expected = case.light();
+    let error = |slices| {
+        let found = case.picture(composite(Some(slices)));
+        errors(&found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect::<Vec<_>>())
+    };
+    let found = [1, 2, 4].map(error);
+    assert!(found.windows(2).all(|pair| pair[1].0 < 0.6 * pair[0].0 && pair[1].1 < pair[0].1), "{found:?}");
+}
+
+#[test]
+fn offsets_of_a_million_change_nothing_but_the_last_digits() {
+    let case = case([18, 15, 13], view(30.0, 25.0, 0.0));
+    let plain = case.picture(composite(None));
+    let far = Case { values: case.values.iter().map(|v| v + 1e6).collect(), ..case.clone() };
+    let over = transfer().over((1e6 + 0.1, 1e6 + 1.0)).expect("a range");
+    let moved =
+        far.picture(Mode::Composite { transfer: over, unit: None, slices: None, light: None, planes: Vec::new() });
+    let off: Vec<f64> = plain.iter().zip(&moved).map(|(a, b)| f64::from((a - b).abs())).collect();
+    assert!(errors(&off).1 < 1e-5, "{:?}", errors(&off));
+    let [near, far] = [&case, &far].map(|case| case.picture(Mode::Mip { slices: None }));
+    for (near, far) in near.iter().zip(&far).filter(|(near, far)| !near.is_nan() || !far.is_nan()) {
+        assert!((f64::from(*far) - 1e6 - f64::from(*near)).abs() < 0.04, "{near} {far}: half a digit of an f32");
+    }
+}
+
+/// Where hardly any sample supports a value, the largest depends on where exactly the kernel is cut.
+#[test]
+fn the_largest_value_is_that_of_brute_force() {
+    for view in views() {
+        let mut case = case([18, 15, 13], view);
+        case.values.iter_mut().for_each(|value| *value -= 0.8);
+        let found = case.picture(Mode::Mip { slices: None });
+        let [low, expected, high] = [0.003, 0.01, 0.03].map(|least| case.largest(least));
+        let is_sure = |n: &usize| (high[*n] - low[*n]).abs() < 1e-3;
+        let off: Vec<f64> =
+            (0..found.len()).filter(is_sure).map(|n| (f64::from(found[n]) - expected[n]).abs()).collect();
+        let ((rms, most), sure) = (errors(&off), off.len());
+        let shown = found.iter().filter(|value| !value.is_nan()).count();
+        let wrong = found
+            .iter()
+            .zip(low.iter().zip(&high))
+            .filter(|(f, (l, h))| (f.is_nan() && !h.is_nan()) || (!f.is_nan() && l.is_nan()));
+        let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
+        assert!(rms < 6e-3 && most < 5e-2, "{name}: rms {rms:e}, largest {most:e}");
+        assert!(sure > shown / 3 && shown > found.len() / 4 && wrong.count() == 0, "{name}: {sure} of {shown}");
+    }
+}
+
+#[test]
+fn probed_rays_tell_the_errors_of_the_picture() {
+    let mut case = case([18, 15, 13], view(30.0, 25.0, 20.0));
+    case.view.size = [90, 80];
+    let expected = case.light();
+    for slices in [1, 2, 4] {
+        let (found, report) = case.rendered(composite(Some(slices)));
+        let probed = report.views[0].probed.expect("rays that meet the volume");
+        let off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
+        let of_pixel = off.chunks_exact(4).map(|pixel| pixel.iter().copied().fold(0.0, f64::max));
+        let shown = of_pixel.zip(expected.chunks_exact(4)).filter(|(_, light)| light[3] > 0.0).map(|(off, _)| off);
+        let (rms, largest) = errors(&shown.collect::<Vec<_>>());
+        assert!(probed.rays > 10 && probed.rms > rms / 4.0 && probed.rms < 4.0 * rms && probed.largest < 2.0 * largest);
+    }
+    let table = report_of_a_step();
+    assert!(table > 1e-3, "{table}");
+}
+
+/// The stated error of a table of a sudden step.
+fn report_of_a_step() -> f64 {
+    let case = case([5, 4, 3], view(30.0, 25.0, 0.0));
+    let step = transfer().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
+    let (_, report) =
+        case.rendered(Mode::Composite { transfer: step, unit: None, slices: None, light: None, planes: Vec::new() });
+    report.views[0].table_error.expect("a table")
+}
+
+/// The same bits for any number of threads.
+#[test]
+fn threads_change_no_bit_of_a_composite() {
+    let mut case = case([40, 47, 13], view(75.0, 15.0, 20.0));
+    case.values[1000..1100].fill(f64::NAN);
+    let shaded =
+        Mode::Composite { transfer: transfer(), unit: None, slices: None, light: Some(LAMP), planes: Vec::new() };
+    let surface = Surface { value: 0.5, colour: [1.0; 3], opacity: 0.5 };
+    let iso = Mode::Iso { surfaces: vec![surface], light: LAMP, slices: None };
+    for mode in [composite(None), Mode::Mip { slices: None }, shaded, iso] {
+        let by = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let bits: Vec<u32> = pool.install(|| case.picture(mode.clone())).into_iter().map(f32::to_bits).collect();
+            bits
+        };
+        assert!(by(1) == by(2) && by(1) == by(5));
+    }
+}

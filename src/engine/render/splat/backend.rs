@@ -1,0 +1,128 @@
+//! The interface to the splat backends: chooses the backend of a view, and answers questions about it.
+//!
+//! [`SplatBackend::choose`] decides once per view. The rest of the renderer asks the backend for numbers (pixels
+//! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
+
+use super::lattice::{Lattice, SliceError, SplattedView};
+use super::tile_rect::{TILE, pixels_reached};
+use crate::render::config::{BACKGROUND, Quantity, RenderConfig, most_splat_error, splat_method};
+use std::ops::Range;
+use std::sync::Arc;
+use wavesplat_core::base::grid::{Grid, Region};
+use wavesplat_core::view::camera::Camera;
+use wavesplat_core::view::footprint::{Footprint, Method};
+
+/// The way in which voxels become pixels.
+#[derive(Debug, Clone)]
+pub(in crate::render) enum SplatBackend {
+    /// Every voxel adds its footprint to the pixels that it covers.
+    Footprints,
+    /// Voxels are spread to the cells of the view's sheared lattice, and pixels gather from the cells.
+    Lattice(Arc<Lattice>),
+}
+
+/// The footprints of a view at the configured splat error.
+///
+/// For certified pictures, the cut is tighter, because weights may be as small as the background threshold.
+pub(super) fn footprint_method(config: &RenderConfig) -> Method {
+    let share = if config.certify && config.quantity == Quantity::Mean { BACKGROUND } else { 1.0 };
+    splat_method(config.quantity, share * config.splat_error)
+}
+
+impl SplatBackend {
+    /// Chooses the backend of a view, and the method named in reports. Certified pictures take footprints. `slices` is
+    /// the largest number of slices that a ray meets, in units of the largest sum of weights in the picture.
+    pub(super) fn choose(config: &RenderConfig, view: &SplattedView<'_>, slices: f64) -> (Self, Method) {
+        let error = most_splat_error(config.quantity, config.splat_error);
+        let stated = |slice: SliceError| match config.quantity {
+            Quantity::Mean => slices * slice.of_a_mean(),
+            Quantity::Emission => slices * slice.sum,
+        };
+        let estimated = |slice: SliceError| match config.quantity {
+            Quantity::Mean => slices * slice.of_a_smooth_mean(),
+            Quantity::Emission => slices * slice.of_waves,
+        };
+        let lattice = || match config.quick {
+            true => Lattice::quick(view, estimated),
+            false => Lattice::within(error, view, stated),
+        };
+        match (!config.certify).then(lattice).flatten() {
+            Some((lattice, method)) => (Self::Lattice(Arc::new(lattice)), method),
+            None => (Self::Footprints, footprint_method(config)),
+        }
+    }
+
+    /// Whether voxels are spread to cells.
+    pub(in crate::render) fn is_lattice(&self) -> bool {
+        matches!(self, Self::Lattice(_))
+    }
+
+    /// Width and height of a tile in pixels.
+    pub(in crate::render) fn tile(&self) -> [usize; 2] {
+        match self {
+            Self::Footprints => [TILE; 2],
+            Self::Lattice(lattice) => lattice.tile(),
+        }
+    }
+
+    /// The columns and rows that any voxel of a region can reach.
+    pub(super) fn pixels_reached(
+        &self,
+        region: &Region,
+        grid: &Grid,
+        camera: &Camera,
+        footprint: &Footprint,
+    ) -> [Range<usize>; 2] {
+        match self {
+            Self::Footprints => pixels_reached(region, grid, camera, footprint),
+            Self::Lattice(lattice) => lattice.pixels_reached(region, camera.size),
+        }
+    }
+
+    /// Whether the tiles of these rows read sums that voxels of a region add to.
+    pub(super) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
+        match self {
+            Self::Footprints => false, // every sum belongs to a pixel
+            Self::Lattice(lattice) => lattice.tiles_read(region, width, rows),
+        }
+    }
+
+    /// An upper bound of the bytes for `planes` planes in a band of `width` x `rows` pixels, without
+    /// [`Self::double_bytes`].
+    pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
+        match self {
+            Self::Footprints => planes * width * rows.next_multiple_of(TILE) * size_of::<f64>(),
+            Self::Lattice(lattice) => lattice.band_bytes(width, rows, planes),
+        }
+    }
+
+    /// An upper bound of the bytes that a plane of a band takes in addition if it needs sums in f64.
+    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.double_bytes(width, rows),
+        }
+    }
+
+    /// An upper bound of the bytes for the sums of the whole picture that a lattice keeps: the cells of ones, and as many
+    /// while they are filtered.
+    pub(in crate::render) fn ones_bytes(&self, width: usize, height: usize) -> usize {
+        2 * self.double_bytes(width, height)
+    }
+
+    /// The f64 numbers that may be kept with a block while it is splatted.
+    pub(in crate::render) fn kept(&self, block: &Region) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.block_cells(block),
+        }
+    }
+
+    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
+    pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.scratch(block, planes),
+        }
+    }
+}

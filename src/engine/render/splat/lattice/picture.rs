@@ -1,0 +1,326 @@
+//! The lattice of one view as a splat backend. A view uses it if its stated error is small enough and it is less work
+//! than footprints.
+
+use super::cells::{Cells, LINE, Rectangle};
+use super::error::{Choice, SliceError, Weighting};
+use super::filtered::{FilteredCells, Window, places, side_by_side};
+use super::kernel::Kernel;
+use super::prefilter::{self, HALF, Taps};
+use super::product::Product;
+use super::shear::Shear;
+use super::spline::{MOST_DEGREE, spread};
+use super::{Placed, Spreading};
+use crate::render::splat::tile_rect::{TILE, TileRect, pixels_around};
+use std::ops::Range;
+use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
+use wavesplat_core::view::camera::Camera;
+use wavesplat_core::view::footprint::{Footprint, Kernel as Gaussian, Method};
+
+/// The lattice of a view.
+#[derive(Debug, Clone)]
+pub(in crate::render) struct Lattice {
+    spreading: Spreading,
+    pub(super) kernel: Kernel,
+    /// The kernel as a product, if it is one.
+    pub(super) product: Option<Product>,
+    /// The prefilters along u and v.
+    taps: [Taps; 2],
+    /// Reach of the footprint in pixels: farther cells do not influence a pixel.
+    reach: f64,
+    /// f at its centre.
+    pub(super) peak: f64,
+    /// The largest number of additions for a cell of a plane.
+    additions: usize,
+    /// The cells that any voxel reaches, prefilter included: the first along each axis, and their number.
+    bounds: ([isize; 2], [usize; 2]),
+}
+
+/// A bound for a kernel, a choice, and its prefilters.
+type Bound = fn(&Weighting<'_>, Choice, &[Taps; 2]) -> SliceError;
+
+/// A view that may be splatted on a lattice.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct SplattedView<'a> {
+    pub(in crate::render) kernel: Gaussian,
+    pub(in crate::render) grid: &'a Grid,
+    /// The voxels that count.
+    pub(in crate::render) clip: &'a Region,
+    pub(in crate::render) blocks: BlockGrid,
+    pub(in crate::render) camera: &'a Camera,
+    /// The exact contribution of a voxel to pixels, without a lattice.
+    pub(in crate::render) footprint: &'a Footprint,
+}
+
+impl SplattedView<'_> {
+    /// Standard deviation of the kernel in pixels.
+    fn sigma(&self) -> f64 {
+        self.kernel.sigma * self.camera.scale
+    }
+
+    /// Products for a plane with a footprint for each voxel.
+    fn footprint_work(&self) -> f64 {
+        let side = |pixels: usize| (2.0 * self.footprint.reach + 1.0).min(pixels as f64);
+        self.clip.voxels() as f64 * side(self.camera.size[0]) * side(self.camera.size[1])
+    }
+}
+
+/// Cells per voxel and degrees of splines, roughly from the cheapest on.
+const CHOICES: [Choice; 8] = [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5], [3, 4], [4, 5]];
+/// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
+const STEEPEST: f64 = 0.5;
+/// The largest number of cells that a square tile reaches.
+const TILE_CELLS: usize = 4096;
+/// Width of a tile in units of its height, if pixels are summed in two passes.
+const WIDE: usize = 4;
+
+impl Lattice {
+    /// The lattice that splats within `error`, and its method for reports; `None` if footprints are better. `stated`
+    /// gives the error of the picture for the error of a slice.
+    pub(in crate::render) fn within(
+        error: f64,
+        view: &SplattedView<'_>,
+        stated: impl Fn(SliceError) -> f64,
+    ) -> Option<(Self, Method)> {
+        let error = error.min(LARGEST);
+        let radius = (2.0 * libm::log(1.0 / (CUT * error))).sqrt();
+        for choice in CHOICES.into_iter().filter(|_| error > LEAST) {
+            let Some(lattice) = Self::new(choice, radius, view) else { continue };
+            if stated(lattice.slice_error(SliceError::at_least)) > error {
+                continue;
+            }
+            let stated_error = stated(lattice.slice_error(SliceError::new));
+            if stated_error <= error {
+                return Some((lattice, Method { name: "lattice", radius, stated_error }));
+            }
+        }
+        None
+    }
+
+    /// The fastest lattice, whose error is only estimated: one cell a voxel. `estimated` gives the estimate for the
+    /// picture from the error of a slice.
+    pub(in crate::render) fn quick(
+        view: &SplattedView<'_>,
+        estimated: impl Fn(SliceError) -> f64,
+    ) -> Option<(Self, Method)> {
+        let (lattice, radius) = (Self::new(QUICK, QUICK_RADIUS, view)?, QUICK_RADIUS);
+        let stated_error = estimated(lattice.slice_error(SliceError::new));
+        Some((lattice, Method { name: "lattice-fast", radius, stated_error }))
+    }
+
+    /// The lattice of a choice, with a kernel that is cut at `radius` standard deviations; `None` if footprints are less
+    /// work, or it does not suit.
+    fn new([fineness, degree]: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
+        let sigma = view.sigma();
+        let SplattedView { grid, clip, blocks, camera, footprint, .. } = *view;
+        let shear = Shear::new(camera, grid, fineness);
+        let kernel = Kernel::new(&shear, sigma, radius)?;
+        let spreading = Spreading { shear, degree, tau: view.kernel.tau };
+        let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
+        let product = Product::new(&shear, sigma, radius);
+        let reach = product.as_ref().map_or_else(|| kernel.reach(&shear, sigma), |product| product.reach(&shear));
+        let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
+        let additions = additions(clip, blocks, shear.axes[2]);
+        let mut lattice = Self { spreading, kernel, product, taps, reach, peak, additions, bounds };
+        if !lattice.suits() || lattice.work(camera, clip) > view.footprint_work() {
+            return None;
+        }
+        lattice.bounds = lattice.filtered_rectangle(clip);
+        Some(lattice)
+    }
+
+    /// The error of a slice, by one of the bounds.
+    fn slice_error(&self, bound: Bound) -> SliceError {
+        let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
+        let choice = [self.spreading.shear.fineness, self.spreading.degree];
+        bound(&Weighting { kernel: &self.kernel, cut, additions: self.additions }, choice, &self.taps)
+    }
+
+    fn suits(&self) -> bool {
+        if !self.is_tame() {
+            return false;
+        }
+        let depths = self.spreading.shear.depths.map(|z| (self.spreading.tau * z).abs());
+        let pixel = self.cells_reached(&(0..1), &(0..1)).1;
+        let steep = depths.into_iter().fold(0.0, f64::max) > STEEPEST;
+        !steep && area(pixel) <= TILE_CELLS
+    }
+
+    /// Whether cell indices are small enough for exact arithmetic.
+    fn is_tame(&self) -> bool {
+        let shear = &self.spreading.shear;
+        let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
+        let positions = [self.position([0.0; 2]), self.half()];
+        let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
+        per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64))
+            && positions.iter().all(|n| within(n, 1e9))
+    }
+
+    /// Estimated work for a plane, in products of a footprint.
+    fn work(&self, camera: &Camera, clip: &Region) -> f64 {
+        let (degree, q) = (self.spreading.degree as f64, self.spreading.shear.fineness as f64);
+        let [b, c] = self.spreading.shear.pixels.map(|step| step.map(|pixels| pixels / q));
+        let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
+        let (pixels, tile) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
+        let copied = area(self.tile_cells(tile)) as f64 * pixels / area(tile) as f64;
+        GATHERING * self.kernel.cells() as f64 * pixels
+            + COPYING * copied
+            + SPREADING * clip.voxels() as f64 * (degree + 1.0) * (q + 1.0)
+    }
+
+    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
+    pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
+        const VALUES: usize = 3; // in their own type, as f32, as f64
+        let tile = area(self.tile_cells(self.tile()).map(|n| n + 2)); // covers rounding and any tile position
+        let in_f32 = side_by_side(planes).div_ceil(2);
+        self.block_cells(block) + VALUES * block.voxels() + (in_f32 + planes + 1) * tile
+    }
+
+    /// The cells that the voxels of a region reach: the first along each axis, and their number.
+    fn rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
+        let Spreading { shear, degree, .. } = self.spreading;
+        let (mut low, mut high) = ([isize::MAX; 2], [isize::MIN; 2]);
+        for corner in 0..8 {
+            let at = |axis: usize| if corner >> axis & 1 == 0 { region.start[axis] } else { region.end[axis] - 1 };
+            let first = shear.position(std::array::from_fn(at)).map(|position| spread(degree, position).0);
+            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(first[i]), high[i].max(first[i])));
+        }
+        // One more cell covers rounding, and cells beyond the cut that count as well.
+        let pad = 1;
+        let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + degree + 1;
+        (low.map(|first| first - pad as isize), [size(0), size(1)])
+    }
+
+    /// The same, with the cells that the prefilter reaches.
+    fn filtered_rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
+        let (first, size) = self.rectangle(region);
+        (first.map(|n| n - HALF as isize), size.map(|n| n + 2 * HALF))
+    }
+
+    /// An upper bound of the distance from a pixel to any cell that counts, along u and v.
+    fn half(&self) -> [f64; 2] {
+        self.product.as_ref().map_or_else(|| self.kernel.half(), Product::half)
+    }
+
+    /// The cells of a rectangle of pixels: the first along each axis, and their number.
+    pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> ([isize; 2], [usize; 2]) {
+        let corners = [x.start, x.end].into_iter().flat_map(|x| [y.start, y.end].map(move |y| [x as f64, y as f64]));
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for position in corners.map(|pixel| self.position(pixel)) {
+            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
+        }
+        let half = self.half();
+        let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
+        (first, [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize))
+    }
+
+    /// Converts a position in pixels to cells.
+    pub(super) fn position(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let shear = &self.spreading.shear;
+        shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]))
+    }
+
+    /// The columns and rows of the picture that a block can reach. Both are empty if either is.
+    pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
+        let (first, cells) = self.filtered_rectangle(region);
+        let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
+        pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
+    }
+
+    /// Whether a block adds to any cell that the tiles of these rows read. Tiles take the mean of all cells that they read, also
+    /// of those that no pixel uses ([`super::bundle`]), so bands must not leave such a block out.
+    pub(in crate::render) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
+        let window = |(first, size): ([isize; 2], [usize; 2])| Window { first, size };
+        let block = window(self.filtered_rectangle(region));
+        TileRect::cover(width, rows.clone(), self.tile()).iter().any(|tile| {
+            let tile = window(self.cells_reached(&tile.x, &tile.y));
+            block.part_in(&tile).iter().all(|(cells, _)| !cells.is_empty())
+        })
+    }
+
+    /// The location in cells of a block's voxels, limited to a region. `extent` gives the cells of the planes.
+    pub(in crate::render) fn placed(&self, region: &Region, clip: &Region, extent: &Rectangle) -> Placed {
+        Placed::new(&self.spreading, region, clip, extent)
+    }
+
+    /// The cells of a band of a picture, with all planes at zero.
+    pub(in crate::render) fn cells_of(&self, width: usize, rows: &Range<usize>, planes: usize) -> Cells {
+        let ((first, size), (low, most)) = (self.cells_reached(&(0..width), rows), self.bounds);
+        let start = [0, 1].map(|i| (first[i] - HALF as isize).max(low[i]));
+        let end = |i: usize| (first[i] + (size[i] + HALF) as isize).min(low[i] + most[i] as isize);
+        let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
+        Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
+    }
+
+    /// The filtered cells of a band.
+    pub(in crate::render) fn filter(&self, cells: Cells) -> FilteredCells {
+        FilteredCells::new(cells, &self.taps)
+    }
+
+    /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. In two passes, the pixels of a row share the sums of columns, so tiles are wide.
+    pub(in crate::render) fn tile(&self) -> [usize; 2] {
+        let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
+        let side = [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
+        [if self.product.is_some() { WIDE * side } else { side }, side]
+    }
+
+    /// Cells along u and v that a tile reaches.
+    fn tile_cells(&self, [width, height]: [usize; 2]) -> [usize; 2] {
+        self.cells_reached(&(0..width), &(0..height)).1
+    }
+
+    /// An upper bound of the bytes for the planes of a band in f32: their sums, and a group of them side by side.
+    pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
+        (planes + places(planes)) * self.band_cells(width, rows) * size_of::<f32>()
+    }
+
+    /// An upper bound of the bytes for a plane of a band in f64.
+    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
+        self.band_cells(width, rows) * size_of::<f64>()
+    }
+
+    /// An upper bound of the cells of a plane of a band.
+    fn band_cells(&self, width: usize, rows: usize) -> usize {
+        let (size, most) = (self.cells_reached(&(0..width), &(0..rows)).1, self.bounds.1);
+        self.held([0, 1].map(|i| (size[i] + 2 * HALF + 2).min(most[i]))) // covers rounding and any band position
+    }
+
+    /// An upper bound of the cells of a plane of a block.
+    pub(in crate::render) fn block_cells(&self, region: &Region) -> usize {
+        let size = self.rectangle(region).1;
+        self.held(size.map(|n| n + MOST_DEGREE + self.spreading.shear.fineness))
+    }
+
+    /// An upper bound of the stored cells for a rectangle of `size` cells: rows are whole cache lines for each phase.
+    fn held(&self, size: [usize; 2]) -> usize {
+        (size[0] + 3 * self.spreading.shear.fineness * LINE) * size[1]
+    }
+}
+
+/// The choice for a quick look, and the cut of its kernel in standard deviations.
+const QUICK: Choice = [1, 3];
+const QUICK_RADIUS: f64 = 3.5;
+/// The share of the error that is left for the cut of the kernel.
+const CUT: f64 = 0.03;
+/// Smaller errors are below what sums in f32 can promise.
+const LEAST: f64 = 3e-5;
+
+/// The measured costs of a product from cells to pixels (weights included), of copying a cell into a tile, and of a
+/// product from voxels to cells, in units of a product of a footprint.
+const GATHERING: f64 = 0.5;
+const COPYING: f64 = 5.0;
+const SPREADING: f64 = 0.15;
+
+/// The largest error to aim for: larger errors would not be cheaper.
+const LARGEST: f64 = 0.05;
+
+/// The largest number of additions in f32 for a cell of a plane: the slices of a block and the voxels of a slice, and the
+/// blocks that a ray can meet, each with its neighbours.
+fn additions(clip: &Region, blocks: BlockGrid, axis: usize) -> usize {
+    let dims = clip.dims();
+    let met: usize = (0..3).map(|a| dims[a].div_ceil(blocks.edges[a]) + 1).sum();
+    blocks.edges[axis].min(dims[axis]) + 2 * (MOST_DEGREE + 1) + 4 * met
+}
+
+fn area([width, height]: [usize; 2]) -> usize {
+    width * height
+}

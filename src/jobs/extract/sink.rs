@@ -1,0 +1,280 @@
+//! Writes extracted samples to files.
+
+use super::{Contents, SampleFormat};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::{Numbered, Output, STANDARD};
+use wavesplat_formats::encoding::Encoding;
+use wavesplat_formats::writer::{OutputFiles, SampleSink, Samples, Writer};
+
+/// The files that an extraction writes.
+#[derive(Debug)]
+pub struct Files {
+    format: SampleFormat,
+    /// The files of samples: one for all frames, or one for each.
+    samples: Vec<PathBuf>,
+    /// A list or a header that refers to `samples`, written last.
+    last: Option<PathBuf>,
+}
+
+impl Files {
+    /// The files for `path`: itself, or `-` for standard output. If each frame has its own file, `path` is a pattern
+    /// like `out_%04d.vti`. Headers and lists also have files beside them.
+    pub fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
+        let writer = format.writer();
+        let (samples, last) = match writer.files {
+            OutputFiles::EachFrame => (numbered(path, format, frames)?, None),
+            OutputFiles::Folder(_) if path == Path::new(STANDARD) => {
+                let label = writer.label.unwrap_or_default();
+                return Err(Error::path(
+                    path,
+                    format!("a {label} store is a folder, which standard output cannot take"),
+                ));
+            }
+            OutputFiles::List { extension, .. } => {
+                let (folder, names) = (path.with_extension(""), Numbered::after(&stem(path)?, extension));
+                (frames.iter().map(|frame| folder.join(names.path(*frame))).collect(), Some(path.into()))
+            }
+            OutputFiles::WithHeader { extension, .. } => {
+                stem(path)?;
+                (vec![path.with_extension(extension)], Some(path.into()))
+            }
+            OutputFiles::One | OutputFiles::Folder(_) => (vec![path.into()], None),
+        };
+        Ok(Self { format, samples, last })
+    }
+
+    /// All files, in the order in which they are completed.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.samples.iter().chain(&self.last).map(PathBuf::as_path)
+    }
+
+    /// The folder of the files of a list.
+    fn folder(&self) -> Option<&Path> {
+        self.samples[0].parent().filter(|_| matches!(self.format.writer().files, OutputFiles::List { .. }))
+    }
+
+    /// Checks in advance, where possible, that the files can be created.
+    fn check(&self, force: bool) -> Result<()> {
+        if let Some(folder) = self.folder().filter(|folder| !folder.is_dir()) {
+            self.last.iter().try_for_each(|list| Output::check(list, force))?;
+            return if folder.exists() { Err(no_folder(folder)) } else { Ok(()) };
+        }
+        self.paths().filter(|path| *path != Path::new(STANDARD)).try_for_each(|path| match path.metadata() {
+            Ok(other) if !other.is_file() && !other.is_dir() => Ok(()), // a device or a pipe
+            _ => Output::check(path, force),
+        })
+    }
+}
+
+/// A name for each frame.
+fn numbered(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Vec<PathBuf>> {
+    if path == Path::new(STANDARD) && frames.len() > 1 {
+        return Err(Error::path(
+            path,
+            format!("standard output takes one .{}, and these are {} frames", format.name(), frames.len()),
+        ));
+    }
+    let names = Numbered::new(path, frames.len())?;
+    Ok(frames.iter().map(|frame| names.path(*frame)).collect())
+}
+
+/// The name without its extension, which the files beside it share.
+fn stem(path: &Path) -> Result<String> {
+    let stem = path.file_stem().filter(|_| path != Path::new(STANDARD) && path.extension().is_some());
+    let what = "other files are written beside this one and named after it, so its name needs an extension";
+    stem.map(|stem| stem.to_string_lossy().into_owned()).ok_or_else(|| Error::path(path, what))
+}
+
+fn no_folder(path: &Path) -> Error {
+    Error::path(path, "is a file, but the files of frames need a folder of this name")
+}
+
+/// A folder created for files; it is removed on drop if it is empty.
+#[derive(Debug)]
+struct Folder(PathBuf);
+
+impl Folder {
+    /// Creates the folder; none if it exists already.
+    fn create(path: &Path) -> Result<Option<Self>> {
+        match fs::create_dir(path) {
+            Ok(()) => Ok(Some(Self(path.into()))),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Ok(None),
+            Err(e) => Err(Error::io(path, "creating the folder", e)),
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir(&self.0); // fails if the folder is not empty
+    }
+}
+
+/// An output, perhaps in gzip.
+#[derive(Debug)]
+enum Stream {
+    Plain(Output),
+    Gzip(GzEncoder<Output>),
+}
+
+impl Stream {
+    fn new(out: Output, gzip: bool) -> Self {
+        if gzip { Self::Gzip(GzEncoder::new(out, GZIP_LEVEL)) } else { Self::Plain(out) }
+    }
+
+    /// Completes the gzip.
+    fn finish(self) -> io::Result<Output> {
+        match self {
+            Self::Plain(out) => Ok(out),
+            Self::Gzip(out) => out.finish(),
+        }
+    }
+}
+
+impl Write for Stream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Plain(out) => out.write(bytes),
+            Self::Gzip(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Plain(out) => out.flush(),
+            Self::Gzip(out) => out.flush(),
+        }
+    }
+}
+
+/// Fast, as nearly all of the time of an extraction goes to gzip.
+const GZIP_LEVEL: Compression = Compression::new(3);
+
+/// Writes samples to the files of an extraction.
+#[derive(Debug)]
+pub struct Sink<'a>(Box<dyn SampleSink + 'a>);
+
+impl<'a> Sink<'a> {
+    /// Opens the first file; existing files are an error unless `force` replaces them.
+    pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
+        let encoding = files.format.encoding(contents);
+        Ok(Self(match files.format.writer().files {
+            OutputFiles::Folder(create) => create(&files.samples[0], contents, encoding, force)?,
+            _ => Box::new(FileSink::create(files, contents, encoding, force)?),
+        }))
+    }
+
+    /// Writes the next samples, given little-endian.
+    pub fn write(&mut self, samples: &[u8]) -> Result<()> {
+        self.0.write(samples)
+    }
+
+    /// Commits the last file of samples, and writes the list or header if there is one.
+    pub fn finish(self) -> Result<()> {
+        self.0.finish()
+    }
+}
+
+/// Writes samples to files.
+#[derive(Debug)]
+struct FileSink<'a> {
+    contents: &'a Contents,
+    files: Files,
+    force: bool,
+    encoding: Encoding,
+    /// The file being written.
+    open: Option<Stream>,
+    /// Bytes of samples still missing in the open file.
+    left: u64,
+    /// The number of files of samples begun.
+    begun: usize,
+    _folder: Option<Folder>, // dropped after the open file
+}
+
+impl<'a> FileSink<'a> {
+    fn create(files: Files, contents: &'a Contents, encoding: Encoding, force: bool) -> Result<Self> {
+        files.check(force)?;
+        let folder = files.folder().map(Folder::create).transpose()?.flatten();
+        let mut sink = Self { contents, files, force, encoding, open: None, left: 0, begun: 0, _folder: folder };
+        sink.begin()?;
+        Ok(sink)
+    }
+}
+
+impl SampleSink for FileSink<'_> {
+    fn write(&mut self, mut samples: &[u8]) -> Result<()> {
+        while !samples.is_empty() {
+            if self.left == 0 {
+                self.end()?;
+                self.begin()?;
+            }
+            let (these, others) = samples.split_at(self.left.min(samples.len() as u64) as usize);
+            if let Some(out) = &mut self.open {
+                self.encoding
+                    .write(these, out)
+                    .map_err(|e| Error::io(&self.files.samples[self.begun - 1], "writing", e))?;
+            }
+            self.left -= these.len() as u64;
+            samples = others;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<()> {
+        self.end()?;
+        let Some(path) = &self.files.last else { return Ok(()) };
+        let mut out = Output::create(path, self.force)?;
+        self.write_last(&mut out).map_err(|e| Error::io(path, "writing", e))?;
+        out.commit()
+    }
+}
+
+impl FileSink<'_> {
+    /// Opens the next file and writes its header.
+    fn begin(&mut self) -> Result<()> {
+        let path = &self.files.samples[self.begun];
+        let frames = self.contents.frames.len() / self.files.samples.len();
+        let mut out = Stream::new(Output::create(path, self.force)?, self.writer().gzip);
+        (self.writer().before)(self.contents, self.samples(self.begun), &mut out)
+            .map_err(|e| Error::io(path, "writing", e))?;
+        self.left = self.contents.voxels().saturating_mul((frames * self.encoding.from.size()) as u64);
+        (self.open, self.begun) = (Some(out), self.begun + 1);
+        Ok(())
+    }
+
+    /// Writes the text after the samples and commits the file.
+    fn end(&mut self) -> Result<()> {
+        let Some(mut out) = self.open.take() else { return Ok(()) };
+        let end = (self.writer().after)(self.contents, self.samples(self.begun - 1));
+        let failed = |e| Error::io(&self.files.samples[self.begun - 1], "writing", e);
+        out.write_all(&end).map_err(failed)?;
+        out.finish().map_err(failed)?.commit()
+    }
+
+    fn writer(&self) -> &'static Writer {
+        self.files.format.writer()
+    }
+
+    /// The samples of a file, by its number.
+    fn samples(&self, file: usize) -> Samples {
+        Samples { ty: self.encoding.to, frame: file }
+    }
+
+    fn write_last(&self, out: &mut Output) -> io::Result<()> {
+        let samples = &self.files.samples;
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        match self.writer().files {
+            OutputFiles::WithHeader { write, .. } => write(self.contents, self.encoding.to, &name(&samples[0]), out),
+            OutputFiles::List { write, .. } => {
+                let folder = self.files.folder().map(name).unwrap_or_default();
+                write(self.contents, &mut samples.iter().map(|path| format!("{folder}/{}", name(path))), out)
+            }
+            OutputFiles::One | OutputFiles::EachFrame | OutputFiles::Folder(_) => Ok(()),
+        }
+    }
+}

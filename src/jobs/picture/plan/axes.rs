@@ -1,0 +1,177 @@
+//! The axes of all voxels: their names, units and coordinates, and positions along them in voxels.
+
+use super::units::{attribute_text, in_letters};
+use crate::picture::values::AxisPosition;
+use wavesplat_core::base::description::{Description, coordinates};
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::Grid;
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::render::annotate::AxisLabels;
+
+/// An axis of voxels.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Axis {
+    /// The names that options may use; the first is the one that is shown.
+    names: Vec<String>,
+    unit: String,
+    /// The coordinate of every voxel.
+    at: Vec<f64>,
+}
+
+/// The axes x, y and z of all voxels, at their true places.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Axes([Axis; 3]);
+
+impl Axes {
+    /// The axes of a grid with true heights, with names and units from the source's description.
+    pub(crate) fn new(grid: &Grid, description: Option<&Description>) -> Self {
+        Self(std::array::from_fn(|along| Axis::new(grid, description, along)))
+    }
+
+    /// The axes of a coefficient file.
+    pub(crate) fn from_file(file: &CoefficientFile) -> Result<Self> {
+        let m = file.metadata();
+        let grid = Grid { dims: m.dims.map(|n| n as usize), spacing: m.spacing, origin: m.origin };
+        Ok(Self::new(&grid, file.description()?.as_ref()))
+    }
+
+    /// The number of the axis with a name, or with the only name that begins like this.
+    pub(crate) fn find(&self, field: &'static str, name: &str) -> Result<usize> {
+        let is = |matches: &dyn Fn(&str) -> bool| -> Vec<usize> {
+            (0..3).filter(|a| self.0[*a].names.iter().any(|own| matches(&own.to_lowercase()))).collect()
+        };
+        let name = name.trim().to_lowercase();
+        let exact = is(&|own| own == name);
+        let found = if exact.is_empty() && name.len() >= 3 { is(&|own| own.starts_with(&name)) } else { exact };
+        match found[..] {
+            [axis] => Ok(axis),
+            _ => {
+                let known: Vec<String> = self.0.iter().map(|axis| axis.names.join(" or ")).collect();
+                Err(Error::setting(field, format!("no axis '{name}'; the axes are {}", known.join(", "))))
+            }
+        }
+    }
+
+    /// A place along an axis, in voxels.
+    pub(crate) fn voxel(&self, field: &'static str, axis: usize, place: &AxisPosition) -> Result<f64> {
+        self.0[axis].voxel(place).map_err(|what| Error::setting(field, what))
+    }
+
+    /// Names, units and coordinates.
+    pub(crate) fn labels(&self) -> [AxisLabels; 3] {
+        self.0.each_ref().map(|axis| AxisLabels {
+            name: axis.names[0].clone(),
+            unit: in_letters(&axis.unit),
+            at: axis.at.clone(),
+        })
+    }
+
+    /// A place in voxels as the options accept it: `depth=120m`.
+    pub(crate) fn text(&self, axis: usize, voxel: f64) -> String {
+        let Axis { names, unit, .. } = &self.0[axis];
+        format!("{}=@{}{unit}", names[0], without_rounding(self.0[axis].coordinate(voxel)))
+    }
+}
+
+impl Axis {
+    fn new(grid: &Grid, description: Option<&Description>, along: usize) -> Self {
+        let letter = ["x", "y", "z"][along].to_string();
+        let own = description.and_then(|all| coordinates(all, along)).filter(|at| at.len() == grid.dims[along]);
+        let regular = || (0..grid.dims[along]).map(|n| grid.origin[along] + grid.spacing[along] * n as f64).collect();
+        let (mut names, unit) = description.map_or_else(Default::default, |all| named(all, along));
+        names.push(letter);
+        names.dedup();
+        Self { names, unit, at: own.unwrap_or_else(regular) }
+    }
+
+    fn voxel(&self, place: &AxisPosition) -> std::result::Result<f64, String> {
+        let last = (self.at.len() - 1) as f64;
+        match place {
+            AxisPosition::Share(share) if (0.0..=1.0).contains(share) => Ok(share * last),
+            AxisPosition::Share(share) => Err(format!("{share} is no share of the axis {}, 0 to 1", self.names[0])),
+            AxisPosition::Voxel(voxel) if (0.0..=last).contains(voxel) => Ok(*voxel),
+            AxisPosition::Voxel(voxel) => {
+                Err(format!("#{voxel} is no voxel; the axis {} has #0 to #{last}", self.names[0]))
+            }
+            AxisPosition::Coordinate(at, unit) => self.check_unit(unit).and_then(|()| self.index(*at)),
+        }
+    }
+
+    fn check_unit(&self, unit: &str) -> std::result::Result<(), String> {
+        let metres = ["m", "meter", "meters", "metre", "metres"];
+        let alike = metres.contains(&unit) && metres.contains(&self.unit.as_str());
+        let degrees = ["deg", "degree", "degrees", "\u{b0}"].contains(&unit) && self.unit.starts_with("degree");
+        if unit.is_empty() || unit == self.unit || alike || degrees {
+            return Ok(());
+        }
+        let own = if self.unit.is_empty() { "has no unit".into() } else { format!("is in {}", self.unit) };
+        Err(format!("'{unit}' is another unit: the axis {} {own}", self.names[0]))
+    }
+
+    /// The place of a coordinate, in voxels: linear between neighbours.
+    fn index(&self, at: f64) -> std::result::Result<f64, String> {
+        let name = &self.names[0];
+        let ascends = self.at.windows(2).all(|pair| pair[0] < pair[1]);
+        if !ascends && !self.at.windows(2).all(|pair| pair[0] > pair[1]) {
+            return Err(format!("the coordinates of the axis {name} do not ascend; take a voxel like #0"));
+        }
+        let (first, last) = (self.at[0], self.at[self.at.len() - 1]);
+        if !(first.min(last)..=first.max(last)).contains(&at) {
+            let range = format!("{} to {} {}", first.min(last), first.max(last), self.unit);
+            return Err(format!("{at} is beyond the axis {name}, which has {}", range.trim_end()));
+        }
+        let before = |own: &f64| if ascends { *own <= at } else { *own >= at };
+        let low = self.at.partition_point(before).saturating_sub(1);
+        let high = (low + 1).min(self.at.len() - 1);
+        let share = if high == low { 0.0 } else { (at - self.at[low]) / (self.at[high] - self.at[low]) };
+        Ok(low as f64 + share)
+    }
+
+    /// The coordinate of a place in voxels.
+    fn coordinate(&self, voxel: f64) -> f64 {
+        let low = (voxel.max(0.0) as usize).min(self.at.len() - 1);
+        let high = (low + 1).min(self.at.len() - 1);
+        let share = voxel - low as f64;
+        if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
+    }
+}
+
+/// A number without the digits that come from rounding.
+fn without_rounding(v: f64) -> f64 {
+    format!("{v:.12e}").parse().unwrap_or(v)
+}
+
+/// The names of an axis in a description, and its unit.
+fn named(description: &Description, along: usize) -> (Vec<String>, String) {
+    let Some(axis) = description.axes.iter().find(|axis| axis.role.voxels() == Some(along)) else {
+        return Default::default();
+    };
+    let name = description.dimensions[axis.dimension as usize].name.clone();
+    let own = description.variables.iter().find(|v| v.name == name && v.dimensions == [axis.dimension]);
+    let attribute = |key| own.and_then(|own| attribute_text(&own.attributes, key));
+    let unit = attribute("units").unwrap_or_default();
+    (std::iter::once(name).chain(attribute("standard_name")).collect(), unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(at: &[f64]) -> Axis {
+        Axis { names: vec!["depth".into(), "z".into()], unit: "m".into(), at: at.to_vec() }
+    }
+
+    #[test]
+    fn coordinates_are_interpolated_on_irregular_and_descending_axes() {
+        let (up, down) = (axis(&[0.0, 10.0, 50.0]), axis(&[50.0, 10.0, 0.0]));
+        for (at, voxel) in [(0.0, 0.0), (5.0, 0.5), (10.0, 1.0), (20.0, 1.25), (50.0, 2.0)] {
+            assert_eq!((up.index(at), down.index(at)), (Ok(voxel), Ok(2.0 - voxel)));
+            assert_eq!((up.coordinate(voxel), down.coordinate(2.0 - voxel)), (at, at));
+        }
+        let beyond = up.index(50.5).expect_err("beyond");
+        assert!(["50.5", "depth", "0 to 50 m"].iter().all(|word| beyond.contains(word)), "{beyond}");
+        assert!(axis(&[0.0, 2.0, 1.0]).index(1.0).is_err());
+        assert_eq!(axis(&[3.0]).index(3.0), Ok(0.0));
+        assert!(up.check_unit("metres").is_ok() && up.check_unit("km").is_err());
+    }
+}

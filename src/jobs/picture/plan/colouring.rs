@@ -1,0 +1,198 @@
+//! The colours of the pictures of a run.
+
+use super::modes;
+use super::planes::{planes_of, with_planes};
+use super::ranges::{self, Needed, Ranges};
+use super::targets::Targets;
+use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
+use crate::picture::reporter::Reporter;
+use crate::picture::request::PictureRequest;
+use crate::picture::values::{ModeName, Theme};
+use serde::Serialize;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::colour::{Norm, Rgb, Scale, TransferFunction};
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::render::sink::PictureFormat;
+use wavesplat_engine::render::{Mode, Pixel, Quantity, RenderConfig, Scene};
+
+/// The colours of pictures and of pictures of their errors.
+pub(in crate::picture) struct Colouring {
+    /// The meaning of a pixel's numbers.
+    pub(in crate::picture) pixel: Pixel,
+    pub(in crate::picture) map: TransferFunction,
+    pub(in crate::picture) picture_scale: Scale,
+    pub(in crate::picture) error_scale: Scale,
+    /// Whether pictures are in colours.
+    in_colours: bool,
+    /// Whether pictures of errors are.
+    errors_in_colours: bool,
+}
+
+/// The values of the first and the last colour, for pictures that are in colours.
+#[derive(Serialize)]
+pub(in crate::picture) struct ColouredPictures {
+    pub(in crate::picture) range: Option<(f64, f64)>,
+    pub(in crate::picture) error_range: Option<(f64, f64)>,
+}
+
+impl Colouring {
+    pub(in crate::picture) fn coloured(&self) -> ColouredPictures {
+        ColouredPictures {
+            range: self.in_colours.then(|| self.picture_scale.range()),
+            error_range: self.errors_in_colours.then(|| self.error_scale.range()),
+        }
+    }
+}
+
+/// The settings and facts that decide the colours of pictures.
+pub(in crate::picture) struct ColouringInput<'a> {
+    pub(in crate::picture) request: &'a PictureRequest,
+    /// Numbers of a sample.
+    pub(in crate::picture) channels: usize,
+    pub(in crate::picture) config: &'a RenderConfig,
+    pub(in crate::picture) pictures: &'a Targets,
+    pub(in crate::picture) errors: Option<&'a Targets>,
+    /// The colours of samples.
+    pub(in crate::picture) colours: Option<&'a TransferFunction>,
+}
+
+impl ColouringInput<'_> {
+    /// The colours, over given ranges or those that `ranges` finds.
+    pub(in crate::picture) fn colouring(
+        &self,
+        ranges: impl FnOnce(Needed) -> Result<Ranges>,
+        reporter: &dyn Reporter,
+    ) -> Result<Colouring> {
+        let request = self.request;
+        let pixel = self.pixel()?;
+        let in_colours = !self.pictures.format.is_of_numbers() || request.colormap.is_some();
+        let errors_in_colours = self.errors.is_some_and(|errors| !errors.format.is_of_numbers());
+        let fixed = self.fixed_range(pixel);
+        let is_clear = self.may_be_clear(pixel) && finds_clear(request);
+        let ranges =
+            ranges(Needed { pictures: in_colours && (fixed.is_none() || is_clear), errors: errors_in_colours })?;
+        let sample_colours = self.colours.filter(|_| pixel != Pixel::Value);
+        let map = sample_colours.map_or_else(|| value_colours(request), |colours| Ok(colours.clone()))?;
+        let (range, norm) = match pixel {
+            Pixel::Value => value_spread(request, &map, &ranges, in_colours, reporter)?,
+            _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
+        };
+        let found = Needed { pictures: in_colours && fixed.is_none(), errors: errors_in_colours };
+        report_ranges(range, &ranges, found, reporter);
+        let scale = |range, norm| Scale::new(&map, range, norm, background(request));
+        let (picture_scale, error_scale) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
+        let may_be_clear = in_colours && self.may_be_clear(pixel);
+        let clear = may_be_clear.then(|| clear_values(request, &ranges, range, reporter)).flatten();
+        let picture_scale = picture_scale.with_clear(clear);
+        Ok(Colouring { pixel, map, picture_scale, error_scale, in_colours, errors_in_colours })
+    }
+
+    /// Whether some values may show the background. Slices show them all.
+    fn may_be_clear(&self, pixel: Pixel) -> bool {
+        pixel == Pixel::Value && modes::mode_name(self.request) != ModeName::Slice
+    }
+
+    /// The meaning of a pixel's numbers. An error if options or formats cannot be used with colours.
+    fn pixel(&self) -> Result<Pixel> {
+        let pixel = if self.channels == 1 { self.config.mode.pixel() } else { Pixel::Channels };
+        if pixel == Pixel::Value {
+            return Ok(pixel);
+        }
+        let targets = std::iter::once(self.pictures).chain(self.errors);
+        let mut grey = targets.filter(|targets| targets.format == PictureFormat::Gray16);
+        if let Some(name) = grey.next().and_then(|targets| targets.names.first()) {
+            let what = "gray16 holds one number a pixel, and colours are three; take png, npy or rgb24";
+            return Err(Error::path(name, what));
+        }
+        refuse_for_colours(self.request)?;
+        Ok(pixel)
+    }
+
+    /// The values of the first and the last colour, if small pictures are not needed to find them. Channels range from
+    /// no to full brightness; only their sums along the ray have no limit. With a transfer function, --range applies to
+    /// samples.
+    fn fixed_range(&self, pixel: Pixel) -> Option<(f64, f64)> {
+        let range = self.request.range.map(|range| range.0.into());
+        let bright = (self.request.quantity == Quantity::Mean).then_some((0.0, 1.0));
+        match pixel {
+            Pixel::Value => range,
+            Pixel::Channels => range.filter(|_| self.colours.is_none()).or(bright),
+            Pixel::Light => self.colours.map(TransferFunction::range),
+        }
+    }
+}
+
+/// The background: as given, or that of the theme.
+fn background(request: &PictureRequest) -> Rgb {
+    let theme_colour = match request.theme {
+        Theme::Dark => [0; 3],
+        Theme::Light => [255; 3],
+    };
+    request.background.map_or(theme_colour, |colour| colour.0)
+}
+
+fn report_ranges((lo, hi): (f64, f64), ranges: &Ranges, found: Needed, reporter: &dyn Reporter) {
+    if found.pictures || found.errors {
+        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
+    }
+    if found.errors {
+        reporter.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
+    }
+}
+
+/// The colours of a composite or of surfaces. A range that is not given ends at the largest value of small pictures.
+/// Opacities that are not given are suggested from an overview of the samples.
+pub(in crate::picture) fn automatic_colours(
+    request: &PictureRequest,
+    scene: &mut dyn Scene,
+    config: &mut RenderConfig,
+    colours: Option<TransferFunction>,
+    reporter: &dyn Reporter,
+) -> Result<Option<TransferFunction>> {
+    let Some(mut colours) = colours else { return Ok(None) };
+    if config.mode.pixel() != Pixel::Light {
+        return Ok(Some(colours));
+    }
+    if modes::has_automatic_range(request)? {
+        let needed = Needed { pictures: true, errors: false };
+        colours = Ranges::small(scene, config, needed, reporter)?.stretch(&colours)?;
+        let (lo, hi) = colours.range();
+        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
+    }
+    if modes::suggests_opacities(request, &colours) {
+        colours = suggested_opacities(request, scene, config, &colours, reporter)?;
+    }
+    let planes = planes_of(&config.mode);
+    config.mode = with_planes(modes::mode(request, Some(&colours))?, planes);
+    Ok(Some(colours))
+}
+
+/// Says which surfaces no sample of the file reaches.
+pub(in crate::picture) fn note_surfaces(
+    config: &RenderConfig,
+    file: Option<&CoefficientFile>,
+    reporter: &dyn Reporter,
+) {
+    let (Mode::Iso { surfaces, .. }, Some(file)) = (&config.mode, file) else { return };
+    let (lo, hi) = file.source_range();
+    for surface in surfaces.iter().filter(|surface| !(lo..=hi).contains(&surface.value)) {
+        let value = surface.value;
+        reporter.note(format_args!("`iso` {value}: no sample reaches it; they are from {lo:.4e} to {hi:.4e}"));
+    }
+}
+
+/// The same colours, with opacities by how rare values are.
+fn suggested_opacities(
+    request: &PictureRequest,
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    colours: &TransferFunction,
+    reporter: &dyn Reporter,
+) -> Result<TransferFunction> {
+    let Some(samples) = ranges::distribution(scene, config, reporter)? else { return Ok(colours.clone()) };
+    let grid = scene.grid();
+    let volume: f64 = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).product();
+    let path = volume.cbrt() / modes::opacity_unit(request, grid);
+    let points = samples.opacities(colours.range(), path);
+    colours.with_opacity(&points).map_err(|what| Error::value("opacity", "auto", what))
+}

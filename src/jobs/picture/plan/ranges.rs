@@ -1,0 +1,365 @@
+//! The default range of colours, taken from small pictures of an overview.
+
+use super::modes::unit;
+use crate::picture::reporter::Reporter;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::{Grid, Region};
+use wavesplat_core::base::progress::{Progress, Silent};
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::colour::{Clear, Common, Distribution, Norm, TransferFunction};
+use wavesplat_core::source::ArraySource;
+use wavesplat_core::view::footprint::Kernel;
+use wavesplat_engine::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
+use wavesplat_engine::render::{check, render, stride};
+
+/// The largest number of pixels used to find a range.
+const MOST_PIXELS: usize = 1 << 20;
+
+/// The longer side of small pictures.
+const PIXELS: f64 = 64.0;
+
+/// The largest distance of neighbours in an overview, in pixels of small pictures.
+const PIXELS_APART: f64 = 1.0;
+
+/// The least standard deviation of the kernel of an overview, in its spacings. It is less than for pictures to look at,
+/// since a wide kernel averages extremes away.
+const SIGMA: f64 = 0.5;
+
+/// The splat error of small pictures; it is small compared with what they leave out.
+const SPLAT_ERROR: f64 = 0.02;
+
+/// A range is taken from at least `LEAST_FRAMES` frames, and from up to `MOST_FRAMES` as long as these have no more
+/// than `MOST_SAMPLES` samples.
+const LEAST_FRAMES: usize = 4;
+const MOST_FRAMES: usize = 16;
+const MOST_SAMPLES: usize = 5 << 20;
+
+/// The largest number of views to look at.
+const MOST_VIEWS: usize = 16;
+
+/// Bytes of the memory budget for each sample of an overview, which then takes at most a quarter of the budget.
+const MEMORY_SHARE: usize = 32;
+
+/// The largest number of samples of a distribution.
+const MOST_OF_DISTRIBUTION: usize = 1 << 20;
+
+/// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview.
+pub(in crate::picture) fn distribution(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    reporter: &dyn Reporter,
+) -> Result<Option<Distribution>> {
+    let frames = spread(scene, LEAST_FRAMES);
+    distribution_of_frames(scene, config, &frames, reporter)
+}
+
+/// The same for these frames.
+pub(in crate::picture) fn distribution_of_frames(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    frames: &[usize],
+    reporter: &dyn Reporter,
+) -> Result<Option<Distribution>> {
+    let small = small(config);
+    let mut thinning = thinning(scene, &small)?;
+    while voxels(&thinning) * LEAST_FRAMES > MOST_OF_DISTRIBUTION && thinning.stride < 64 {
+        thinning.stride *= 2;
+    }
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    let request = OverviewRequest { thinning, frames, region };
+    let samples = scene.overview(&request, reporter.progress("overview", "steps").as_ref())?;
+    Ok(samples.map(Distribution::new))
+}
+
+/// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
+/// range.
+fn robust_range(values: &[f32]) -> (f64, f64) {
+    let few = values.len() / 200;
+    let at = |n: usize| f64::from(values[n]);
+    let (lo, hi, low, high) = (at(0), at(values.len() - 1), at(few), at(values.len() - 1 - few));
+    let (large, least) = (0.4 * (hi - lo), 0.05 * (hi - lo));
+    let clipped = |end: f64, inner: f64| if (end - inner).abs() >= large && high - low > least { inner } else { end };
+    (clipped(lo, low), clipped(hi, high))
+}
+
+/// The settings of small pictures.
+fn small(config: &RenderConfig) -> RenderConfig {
+    let views = spread_over(config.views.len(), MOST_VIEWS).into_iter().map(|view| config.views[view]).collect();
+    let mut small = RenderConfig { views, paired: false, certify: false, ..config.clone() };
+    if matches!(config.mode, Mode::Planes { .. }) {
+        return small; // planes are small already: their blocks are the work, and not their pixels
+    }
+    for view in &mut small.views {
+        let shrink = (PIXELS / view.size[0].max(view.size[1]) as f64).min(1.0);
+        view.size = view.size.map(|n| ((n as f64 * shrink).ceil() as usize).max(1));
+        view.scale = view.scale.map(|s| s * shrink);
+    }
+    small.mode = match config.mode {
+        Mode::Projection | Mode::Planes { .. } => config.mode.clone(),
+        // The colours of a composite are those of its samples, and the largest samples along rays are enough to find
+        // where they end.
+        Mode::Composite { .. } | Mode::Iso { .. } | Mode::Mip { .. } => Mode::Mip { slices: None },
+    };
+    small
+}
+
+/// The same pictures, less exact.
+fn rough(small: &RenderConfig) -> RenderConfig {
+    let quick = matches!(small.mode, Mode::Projection);
+    RenderConfig { quick, splat_error: small.splat_error.max(SPLAT_ERROR), ..small.clone() }
+}
+
+/// At most `count` frames, spread over the archive.
+fn spread(scene: &dyn Scene, count: usize) -> Vec<usize> {
+    spread_over(scene.frames().unwrap_or(1), count)
+}
+
+/// At most `count` of the numbers below `all`, from the first to the last.
+fn spread_over(all: usize, count: usize) -> Vec<usize> {
+    let mut chosen: Vec<usize> = (0..count).map(|i| i * all.saturating_sub(1) / (count - 1)).collect();
+    chosen.dedup();
+    chosen
+}
+
+/// The number of samples to take.
+fn most_samples(small: &RenderConfig) -> usize {
+    MOST_SAMPLES.min(small.memory / MEMORY_SHARE)
+}
+
+/// The number of frames of `voxels` voxels in which to look for a range.
+fn frames_of(voxels: usize, small: &RenderConfig) -> usize {
+    (most_samples(small) / voxels).clamp(LEAST_FRAMES, MOST_FRAMES)
+}
+
+/// The progress of small pictures.
+fn progress<'a>(stage: &'static str, small: &RenderConfig, reporter: &'a dyn Reporter) -> Box<dyn Progress + 'a> {
+    reporter.progress(stage, unit(&small.mode))
+}
+
+/// The values of small pictures of a few frames.
+fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, reporter: &dyn Reporter) -> Result<Vec<f32>> {
+    let frames = spread(scene, frames_of(scene.grid().dims.iter().product(), small));
+    let mut values = Vec::new();
+    pictures(
+        scene,
+        &RenderConfig { frames, ..small.clone() },
+        progress("range", small, reporter).as_ref(),
+        &mut values,
+    )?;
+    Ok(values)
+}
+
+/// The values of small pictures of an overview; none if the scene has none, or the volume is too small for one.
+fn values_of_overview(
+    scene: &mut dyn Scene,
+    small: &RenderConfig,
+    reporter: &dyn Reporter,
+) -> Result<Option<Vec<f32>>> {
+    if matches!(small.mode, Mode::Planes { .. }) {
+        return Ok(None);
+    }
+    let thinning = thinning(scene, small)?;
+    if thinning.stride == 1 {
+        return Ok(None);
+    }
+    let frames = spread(scene, frames_of(voxels(&thinning), small));
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    let request = OverviewRequest { thinning, frames: &frames, region };
+    let Some(overview) = scene.overview(&request, reporter.progress("overview", "steps").as_ref())? else {
+        return Ok(None);
+    };
+    let (grid, mut values) = (thinning.grid(scene.grid()), Vec::new());
+    let config = overview_config(&request, &grid, small, size_of_val(&overview[..]));
+    for samples in overview.chunks_exact(request.samples()) {
+        let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        let mut frames = FrameScene::new(Box::new(ArraySource::new(grid, SampleType::F32, bytes)?), None);
+        // One bar for each channel would look like a restart.
+        match scene.channels() {
+            1 => pictures(&mut frames, &config, progress("range", small, reporter).as_ref(), &mut values)?,
+            _ => pictures(&mut frames, &config, &Silent, &mut values)?,
+        };
+    }
+    Ok(Some(values))
+}
+
+/// How to thin a scene for small pictures.
+fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
+    let edge = scene.blocks().edges.into_iter().fold(0, usize::max);
+    let most = most_samples(small);
+    let mut thinning = Thinning { blocks: scene.blocks(), stride: stride(scene.grid(), small, PIXELS_APART)? };
+    // From then on, a block has one voxel.
+    while voxels(&thinning) * scene.channels() * LEAST_FRAMES > most && thinning.stride < edge {
+        thinning.stride *= 2;
+    }
+    Ok(thinning)
+}
+
+/// The settings of small pictures of an overview, which takes `bytes` twice.
+fn overview_config(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig, bytes: usize) -> RenderConfig {
+    let sigma = small.kernel.sigma.max(SIGMA * grid.largest_spacing());
+    RenderConfig {
+        kernel: Kernel { sigma, ..small.kernel },
+        frames: (0..request.frames.len()).collect(),
+        region: small.region.map(|region| request.thinning.region(&region)),
+        allowed: None,
+        memory: small.memory.saturating_sub(2 * bytes),
+        ..small.clone()
+    }
+}
+
+/// The number of voxels in a frame of an overview.
+fn voxels(thinning: &Thinning) -> usize {
+    thinning.blocks().dims.iter().product()
+}
+
+/// Renders small pictures, and adds their values to `values`.
+fn pictures(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    progress: &dyn Progress,
+    values: &mut Vec<f32>,
+) -> Result<RenderReport> {
+    let pixels = config.frames.len() * config.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
+    let step = pixels.div_ceil(MOST_PIXELS).max(1);
+    render(scene, config, progress, &mut |rendered| {
+        values.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
+        Ok(())
+    })
+}
+
+/// Which ranges are needed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::picture) struct Needed {
+    pub(in crate::picture) pictures: bool,
+    pub(in crate::picture) errors: bool,
+}
+
+/// The ranges of the pictures and of their errors.
+pub(in crate::picture) struct Ranges {
+    pub(in crate::picture) values: (f64, f64),
+    /// The smallest value above 0, if there is one.
+    positive: Option<f64>,
+    pub(in crate::picture) errors: (f64, f64),
+    /// The values of small pictures.
+    all: Distribution,
+}
+
+impl Default for Ranges {
+    fn default() -> Self {
+        Self { values: (0.0, 1.0), positive: Some(1.0), errors: (0.0, 1.0), all: Distribution::default() }
+    }
+}
+
+impl Ranges {
+    /// The ranges in small pictures, if any are needed: of pictures, or of their errors. The frames of the pictures are
+    /// spread over the archive, so the ranges do not depend on the frames to render. If the pictures are empty, the
+    /// range is (0, 1). Errors begin at 0.
+    pub(in crate::picture) fn small(
+        scene: &mut dyn Scene,
+        config: &RenderConfig,
+        needed: Needed,
+        reporter: &dyn Reporter,
+    ) -> Result<Self> {
+        let mut ranges = Self::default();
+        if !needed.pictures && !needed.errors {
+            return Ok(ranges);
+        }
+        check(scene, config)?; // before small pictures are rendered, so that errors name the full size
+        let small = small(config);
+        if needed.pictures {
+            let rough = rough(&small);
+            let values = values_of_overview(scene, &rough, reporter)?;
+            ranges.set_values(values.map_or_else(|| values_of_frames(scene, &rough, reporter), Ok)?);
+        }
+        if needed.errors {
+            let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
+            let report = pictures(
+                scene,
+                &certified,
+                progress("range of errors", &certified, reporter).as_ref(),
+                &mut Vec::new(),
+            )?;
+            ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
+        }
+        Ok(ranges)
+    }
+
+    /// The ranges of pictures of a few of some frames. `render` gives them, row by row.
+    pub(in crate::picture) fn from_pictures(
+        frames: &[usize],
+        render: impl FnOnce(&[usize], &mut dyn FnMut(&[f32])) -> Result<()>,
+    ) -> Result<Self> {
+        let some: Vec<usize> = spread_over(frames.len(), MOST_FRAMES).into_iter().map(|n| frames[n]).collect();
+        let (mut ranges, mut values) = (Self::default(), Vec::new());
+        render(&some, &mut |picture| {
+            let step = (picture.len() * some.len()).div_ceil(MOST_PIXELS).max(1);
+            values.extend(picture.iter().step_by(step).filter(|v| !v.is_nan()));
+        })?;
+        ranges.set_values(values);
+        Ok(ranges)
+    }
+
+    fn set_values(&mut self, values: Vec<f32>) {
+        self.all = Distribution::new(values);
+        let values = self.all.values();
+        if !values.is_empty() {
+            self.values = robust_range(values);
+            self.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
+        }
+    }
+
+    /// The values that show the background, if small pictures have much empty space.
+    pub(in crate::picture) fn clear(&self, range: (f64, f64)) -> Option<(Clear, Common)> {
+        Clear::empty_space(&self.all, range)
+    }
+
+    /// The colours over the range of all values, up to the largest value of small pictures. Extreme values that would
+    /// take most of the colours do not count.
+    pub(in crate::picture) fn stretch(&self, colours: &TransferFunction) -> Result<TransferFunction> {
+        let ((lo, hi), most) = (colours.range(), self.values.1);
+        if !(0.0 < most && most < hi) {
+            return Ok(colours.clone());
+        }
+        colours.over((if lo < 0.0 { lo * most / hi } else { lo.min(0.5 * most) }, most))
+    }
+
+    /// The range from 0 to the largest value.
+    pub(in crate::picture) fn up_from_zero(&self) -> (f64, f64) {
+        (0.0, self.values.1)
+    }
+
+    /// The default range of colours.
+    pub(in crate::picture) fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
+        const DECADES: f64 = 1e-4;
+        let (lo, hi) = self.values;
+        if norm == Norm::Log {
+            let least =
+                self.positive.ok_or_else(|| Error::value("norm", "log", "no value is above 0; give `norm` linear"))?;
+            return Ok((least.max(hi * DECADES), hi));
+        }
+        Ok(if lo < hi { map.suitable(at_least_noticeable((lo, hi))) } else { (lo, hi) })
+    }
+}
+
+/// The range around the same middle, at least as wide as a hundred thousandth of its values. What changes by less is mostly
+/// rounding, and should look constant.
+fn at_least_noticeable((lo, hi): (f64, f64)) -> (f64, f64) {
+    const LEAST: f64 = 1e-5;
+    let (middle, half) = (lo / 2.0 + hi / 2.0, LEAST / 2.0 * lo.abs().max(hi.abs()));
+    if (hi - lo) / 2.0 < half { (middle - half, middle + half) } else { (lo, hi) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_wider_than_rounding() {
+        let near = |(lo, hi): (f64, f64), (a, b): (f64, f64)| (lo - a).abs() < 1e-9 && (hi - b).abs() < 1e-9;
+        assert!(near(at_least_noticeable((300.0, 300.00003)), (299.998_515, 300.001_515)));
+        assert!(near(at_least_noticeable((-5.000_001, -5.0)), (-5.000_025_5, -4.999_975_5)));
+        for range in [(300.0, 300.1), (0.0, 1e-20), (-1e-9, 1e-9), (1.0, 1.000_011)] {
+            assert_eq!(at_least_noticeable(range), range);
+        }
+    }
+}

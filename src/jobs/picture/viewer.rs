@@ -1,0 +1,308 @@
+//! Pictures for a page that asks for them: facts about a scene, a page with them, and pictures by request.
+
+use super::plan::Plan;
+use super::plan::config::render_config;
+use super::plan::opened::Opened;
+use super::plan::ranges::distribution;
+use super::plan::ranges::distribution_of_frames;
+use super::reporter::Caller;
+use super::request::{PictureRequest, option};
+use super::series::series_csv;
+use super::session::Session;
+use super::values::{AxisPosition, PointSpec};
+use super::view_request::ViewRequest;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use wavesplat_core::base::address::public_name;
+use wavesplat_core::base::cancel::CancelToken;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::Output;
+use wavesplat_core::base::progress::Silent;
+use wavesplat_core::colour::Distribution;
+use wavesplat_engine::render::annotate::AxisLabels;
+use wavesplat_engine::render::page::{self, Planes};
+use wavesplat_engine::render::sink::{BlockOfFrames, PageEncoder, Sink, SinkConfig};
+use wavesplat_engine::render::{Mode, Pixel, render};
+
+/// A viewer: open inputs, and the settings that no request of the page changes.
+#[derive(Debug)]
+pub struct ViewerSession {
+    session: Session,
+    base: PictureRequest,
+    /// Words for how the inputs are opened.
+    input_words: Vec<String>,
+}
+
+/// The facts about the scene that a page gets before it asks for pictures.
+#[derive(Debug, Serialize)]
+struct Facts {
+    live: bool,
+    /// The name of the file.
+    title: String,
+    /// Name and unit of the values.
+    values: String,
+    /// The time of each frame.
+    labels: Vec<String>,
+    /// The point in the middle of the volume as it is drawn, and half of its diagonal.
+    center: [f64; 3],
+    radius: f64,
+    /// Voxels along x, y and z, the place of the first, and their distance.
+    dims: [usize; 3],
+    origin: [f64; 3],
+    spacing: [f64; 3],
+    /// The meaning of x, y and z.
+    axes: [AxisLabels; 3],
+    /// The least and the largest sample, if the file says.
+    range: Option<(f64, f64)>,
+    /// The coarsest level of detail.
+    coarsest: u32,
+    maps: BTreeMap<String, String>,
+}
+
+/// The head of an answer, which comes before its blocks.
+#[derive(Serialize)]
+struct Answer<'a> {
+    about: &'a page::About,
+    /// The blocks that follow, and their lengths in bytes.
+    blocks: Vec<(BlockOfFrames, usize)>,
+    /// Bytes of one more block after the others, with the largest error of each pixel.
+    errors: Option<usize>,
+    /// The opacities of a composite, at shares of its range.
+    opacity: Option<Vec<(f64, f64)>>,
+}
+
+/// A histogram of values.
+#[derive(Debug, Serialize)]
+pub struct Histogram {
+    /// The least and the largest value.
+    range: Option<(f64, f64)>,
+    /// How many values lie in each of equal parts of the range.
+    counts: Vec<usize>,
+    /// A value with a surface: halfway from the most common value to the end that is farther from it.
+    surface: Option<f64>,
+}
+
+impl ViewerSession {
+    /// A viewer of some inputs; `base` has the settings of all pictures. The commands that it gives have `input_words` for
+    /// how the inputs are opened.
+    pub fn new(session: &Session, base: PictureRequest, input_words: Vec<String>) -> Self {
+        Self { session: session.keeping_decoded(), base: PictureRequest { output: PAGE.into(), ..base }, input_words }
+    }
+
+    /// Opens a file that has changed again for the next picture.
+    pub fn reopen_after(&self, error: &Error) {
+        if error.exit_code() == 4 {
+            self.session.reopen();
+        }
+    }
+
+    /// The page that shows a scene of these [`Self::facts`].
+    pub fn page(facts: &str, nonce: &str) -> Result<String> {
+        page::live(nonce, facts).map_err(|e| Error::io(Path::new("page"), "writing", e))
+    }
+
+    /// The facts about the scene for the page, as JSON.
+    pub fn facts(&self) -> Result<String> {
+        serde_json::to_string(&self.known()?).map_err(|e| Error::setting("facts", e.to_string()))
+    }
+
+    fn known(&self) -> Result<Facts> {
+        let Opened { scene, file, annotation, axes, .. } = Opened::new(&self.session, &self.base, &Caller(&Silent))?;
+        let grid = file.as_ref().map_or(*scene.grid(), |file| file.whole_grid());
+        let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
+        let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
+        let name = self.session.paths().first().map(|input| public_name(input));
+        let name = name.as_deref().and_then(Path::file_name);
+        Ok(Facts {
+            live: true,
+            title: name.unwrap_or_default().to_string_lossy().into_owned(),
+            labels: (0..scene.frames().unwrap_or(0)).map(|frame| annotation.stamp(frame)).collect(),
+            values: annotation.values,
+            center: [0, 1, 2].map(middle),
+            radius: sides.iter().map(|side| side * side).sum::<f64>().sqrt() / 2.0,
+            dims: grid.dims,
+            origin: grid.origin,
+            spacing: grid.spacing,
+            axes: axes.labels(),
+            range: file.as_ref().map(|file| file.source_range()),
+            coarsest: file.as_ref().map_or(0, |file| file.coarsest_detail()),
+            maps: page::maps()?,
+        })
+    }
+
+    /// The pictures of a request: their description, then blocks of their numbers. `web/live.js` reads it.
+    ///
+    /// # Errors
+    /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
+    pub fn pictures(&self, view: &ViewRequest, work: &CancelToken) -> Result<Vec<u8>> {
+        let request = view.applied_for_colours(&self.base);
+        let mut plan = Plan::new(&self.session, &request, &Caller(work))?;
+        plan.config.frames.retain(|frame| view.wants(*frame));
+        if plan.config.frames.is_empty() {
+            return Err(Error::setting("frames", "the archive has none of these"));
+        }
+        let sink = SinkConfig { shown: plan.config.shown(), ..plan.sinks(&request).config()? };
+        view.check_memory(sink.pixel.numbers(), plan.config.memory)?;
+        Answer::encode(&mut plan, sink, view.packed, work)
+    }
+
+    /// The time series of a point, as `--probe` writes it: lines of comma-separated values. X, Y and Z are shares of the
+    /// axes.
+    ///
+    /// # Errors
+    /// Inputs that are no coefficient file, or reads that fail.
+    pub fn series(&self, shares: [f64; 3], work: &CancelToken) -> Result<Vec<u8>> {
+        let probe = vec![PointSpec(shares.map(AxisPosition::Share))];
+        series_csv(&self.session, &PictureRequest { probe, ..self.base.clone() }, &Caller(work))
+    }
+
+    /// How common samples of a frame are, or samples of some frames.
+    ///
+    /// # Errors
+    /// A frame that the archive lacks, or those of rendering.
+    pub fn histogram(&self, frame: Option<usize>, work: &CancelToken) -> Result<Histogram> {
+        let frames = frame.map_or(self.base.frames.clone(), |frame| Some((frame..frame + 1).into()));
+        let (request, caller) = (PictureRequest { frames, ..self.base.clone() }, Caller(work));
+        let Opened { mut scene, file, colours, .. } = Opened::new(&self.session, &request, &caller)?;
+        let all = scene.frames().unwrap_or(0);
+        let memory = self.session.memory;
+        let config = render_config(&request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, memory)?;
+        let samples = match frame {
+            Some(frame) => distribution_of_frames(scene.as_mut(), &config, &[frame], &caller)?,
+            None => distribution(scene.as_mut(), &config, &caller)?,
+        };
+        Ok(samples
+            .as_ref()
+            .map_or_else(|| Histogram { range: None, counts: Vec::new(), surface: None }, Histogram::new))
+    }
+
+    /// The file of the pictures of a request, made in memory; ffmpeg alone needs a file for a movie.
+    pub fn save(&self, view: &ViewRequest, saved: Saved, work: &CancelToken) -> Result<Vec<u8>> {
+        if saved != Saved::Movie {
+            let (out, bytes) = Output::to_memory(saved.name());
+            self.write(view, saved, out, work)?;
+            return Ok(bytes.try_recv().unwrap_or_default());
+        }
+        let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
+        let path = folder.path().join(saved.name());
+        self.write(view, saved, Output::create(&path, true)?, work)?;
+        std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
+    }
+
+    /// Writes the pictures of a request.
+    fn write(&self, view: &ViewRequest, saved: Saved, out: Output, work: &CancelToken) -> Result<()> {
+        let output = saved.name().into();
+        let request = PictureRequest { output, certify: false, ..view.applied_to(&self.base) };
+        let mut plan = Plan::new(&self.session, &request, &Caller(work))?;
+        let config = SinkConfig { shown: plan.config.shown(), ..plan.sinks(&request).config()? };
+        let mut sink = Sink::to_output(out, config)?;
+        render(plan.scene.as_mut(), &plan.config, work, &mut |rendered| sink.picture(&rendered))?;
+        sink.finish()
+    }
+
+    /// The command that draws a request.
+    pub fn command(&self, view: &ViewRequest, saved: Saved) -> String {
+        let request = PictureRequest { certify: false, ..view.applied_to(&self.base) };
+        let inputs = self.session.paths().iter().map(|path| path.to_string_lossy().into_owned());
+        let words =
+            request.words().into_iter().chain(view.certify.then(|| format!("--{}=error.npy", option("error_image"))));
+        let all = inputs.chain(self.input_words.iter().cloned()).chain(words).chain(["-o".into(), saved.name().into()]);
+        all.fold("wavesplat-render".into(), |line, word| line + " " + &quoted(&word))
+    }
+}
+
+impl Answer<'_> {
+    /// Renders planned pictures, and encodes them for the page: in few bytes if they are to be packed.
+    fn encode(plan: &mut Plan, sink: SinkConfig, packs: bool, work: &CancelToken) -> Result<Vec<u8>> {
+        let (size, pixel, failed) = (sink.size, sink.pixel, |e| Error::io(Path::new("page"), "writing", e));
+        let (mut encoder, mut blocks) = (PageEncoder::new(sink)?, Vec::new());
+        let mut errors = Planes::new(size, 1, false);
+        let step = encoder.step();
+        let packed = |planes: Planes| if packs { planes.coded(step) } else { planes.raw() }.map_err(failed);
+        let mut give = |frames: BlockOfFrames, planes: Planes| {
+            blocks.push((frames, packed(planes)?));
+            Ok(())
+        };
+        render(plan.scene.as_mut(), &plan.config, work, &mut |rendered| {
+            if let Some(error) = rendered.error.filter(|_| pixel == Pixel::Value) {
+                errors.push(error, |value| value);
+            }
+            encoder.picture(&rendered, &mut give)
+        })?;
+        encoder.rest(&mut give)?;
+        let errors = (errors.pictures() > 0).then(|| errors.raw().map_err(failed)).transpose()?;
+        let answer = Answer {
+            about: &encoder.about().without_maps(),
+            blocks: blocks.iter().map(|(frames, block)| (*frames, block.len())).collect(),
+            errors: errors.as_ref().map(Vec::len),
+            opacity: opacities(&plan.config.mode),
+        };
+        let head = page::headed(&answer).map_err(failed)?;
+        Ok(blocks.into_iter().map(|(_, block)| block).chain(errors).fold(head, |mut all, block| {
+            all.extend(block);
+            all
+        }))
+    }
+}
+
+/// A kind of file that the page saves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Saved {
+    /// One picture.
+    Picture,
+    /// A page of all frames.
+    Page,
+    /// A movie of all frames.
+    Movie,
+}
+
+impl Saved {
+    const NAMES: [(&'static str, Self); 3] =
+        [("picture.png", Self::Picture), ("page.html", Self::Page), ("movie.mp4", Self::Movie)];
+
+    /// The kind of a file of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, saved)| saved)
+    }
+
+    fn name(self) -> &'static str {
+        Self::NAMES.into_iter().find(|(_, saved)| *saved == self).map_or("picture.png", |(name, _)| name)
+    }
+}
+
+impl Histogram {
+    fn new(samples: &Distribution) -> Self {
+        let (values, mut counts) = (samples.values(), vec![0; BARS]);
+        let range = values.first().zip(values.last()).map(|(lo, hi)| (f64::from(*lo), f64::from(*hi)));
+        let Some((lo, hi)) = range else { return Self { range, counts, surface: None } };
+        let bar = |value: f32| ((f64::from(value) - lo) / (hi - lo) * BARS as f64) as usize;
+        values.iter().for_each(|value| counts[bar(*value).min(BARS - 1)] += 1);
+        let common = samples.empty((lo, hi)).or_else(|| samples.common((lo, hi))).map_or(lo, |common| common.value);
+        let end = if hi - common >= common - lo { hi } else { lo };
+        Self { range, counts, surface: Some((common + end) / 2.0) }
+    }
+}
+
+/// The opacities of a composite, at shares of its range.
+fn opacities(mode: &Mode) -> Option<Vec<(f64, f64)>> {
+    let Mode::Composite { transfer, .. } = mode else { return None };
+    let (lo, hi) = transfer.range();
+    Some(transfer.opacity_points().iter().map(|(value, opacity)| ((value - lo) / (hi - lo), *opacity)).collect())
+}
+
+/// Parts of a histogram: many more than a page draws, for it may draw a part of the range.
+const BARS: usize = 2048;
+
+/// The format of the pictures of a page. No file of this name is written.
+const PAGE: &str = "live.html";
+
+/// A word as shells take it.
+fn quoted(word: &str) -> String {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_=.,/:%@+".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.into()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
