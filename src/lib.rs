@@ -66,46 +66,48 @@
 //! [`file::CoefficientFile::from_storage`] any other storage. [`extract::extract`] and
 //! [`extract::Sink`] write the formats of other programs.
 //!
-//! # Folders
+//! # Packages
 //!
-//! The folders below `src/`. Each uses only folders listed before it; so the order is nearly the path of the data.
+//! This package is the front of five others, and has the two programs. Each folder below `src/` is a package; the rooms in it
+//! are modules, and use only those listed before them. So the order is nearly the path of the data.
 //!
-//! | folder | content |
-//! |---|---|
-//! | `base` | errors, grids, samples, mapped files, output files |
-//! | `colour` | transfer functions, and the colours of pixels |
-//! | `remote` | files behind `https://` and `s3://`: requests, pages that are kept, a cache |
-//! | `source` | frames in order behind one trait, a window at a time |
-//! | `formats` | formats of files, for both directions: headers of inputs, and of extracted samples |
-//! | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
-//! | `codec` | one block: samples to codes under the error bound, and back |
-//! | `file` | the coefficient file: open, verify, recover, continue |
-//! | `view` | cameras and footprints (eq 1 to 3, 14) |
-//! | `convert` | frames to a coefficient file: reader, workers and writer |
-//! | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
-//! | `extract` | a coefficient file back to samples and to files of other programs |
-//! | `picture` | a request for pictures, resolved and carried out, for the programs, the viewer and Python |
-//! | `cli` | the options and commands of the programs in `bin/`, and the server of the viewer |
+//! | folder | room | content |
+//! |---|---|---|
+//! | `core` | `base` | errors, grids, samples, mapped files, output files |
+//! | | `colour` | transfer functions, and the colours of pixels |
+//! | | `source` | frames in order behind one trait, a window at a time |
+//! | | `wavelet` | the transform of a series along time, and its inverse (eq 5 and 8) |
+//! | | `codec` | one block: samples to codes under the error bound, and back |
+//! | | `view` | cameras and footprints (eq 1 to 3, 14) |
+//! | `formats` | | formats of files, for both directions: headers of inputs, and of extracted samples |
+//! | `engine` | `remote` | files behind `https://` and `s3://`: requests, pages that are kept, a cache |
+//! | | `file` | the coefficient file: open, verify, recover, continue |
+//! | | `convert` | frames to a coefficient file: reader, workers and writer |
+//! | | `render` | blocks to planes (eq 9), planes to frames (eq 8), frames to picture files |
+//! | `jobs` | `extract` | a coefficient file back to samples and to files of other programs |
+//! | | `picture` | a request for pictures, resolved and carried out, for the programs, the viewer and Python |
+//! | `cli` | | the options and commands of the programs in `bin/`, and the server of the viewer |
 //!
-//! The bytes of a coefficient file are a package of their own, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
+//! `formats` and `engine` use `core` and not each other; `jobs` uses all three; `cli` uses `jobs`. The bytes of a coefficient
+//! file are a package beside `src/`, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
 //!
 //! # From a request to a pixel
 //!
 //! A [`picture::PictureRequest`] says in plain data what is asked for. Options (`cli/render/args.rs`), the page of the viewer
-//! (`picture/view_request.rs`) and Python give one. [`picture::run()`] resolves it against the open inputs of a
-//! [`picture::Session`]: `Plan::new` (`picture/plan/mod.rs`) finds frames, views, colours, ranges and files. Then:
+//! (`jobs/picture/view_request.rs`) and Python give one. [`picture::run()`] resolves it against the open inputs of a
+//! [`picture::Session`]: `Plan::new` (`jobs/picture/plan/mod.rs`) finds frames, views, colours, ranges and files. Then:
 //!
-//! 1. `CoefficientFile::open` (`file/coefficient_file.rs`) reads the directory of blocks.
-//! 2. `render` (`render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each view,
-//!    `Sliced` or `Planes`. All loop over batches of frames with `for_each_batch` (`render/batches/driver.rs`).
-//! 3. `Scene::open` (`render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
-//! 4. `splat` (`render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`file/coefficient_file.rs`), decodes
-//!    it (`codec/decode.rs`) and gives the values of its planes (`render/scenes/coded.rs`).
-//! 5. The values are added to a lattice (`render/splat/lattice/spread.rs`), or to pixels (`render/splat/footprints.rs`).
-//! 6. `PixelReconstructor::tile` (`render/projection/reconstruct.rs`) gathers the planes at pixels from the lattice
-//!    (`render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`wavelet/`), and divides by
+//! 1. `CoefficientFile::open` (`engine/file/coefficient_file.rs`) reads the directory of blocks.
+//! 2. `render` (`engine/render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each view,
+//!    `Sliced` or `Planes`. All loop over batches of frames with `for_each_batch` (`engine/render/batches/driver.rs`).
+//! 3. `Scene::open` (`engine/render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
+//! 4. `splat` (`engine/render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`engine/file/coefficient_file.rs`), decodes
+//!    it (`core/codec/decode.rs`) and gives the values of its planes (`engine/render/scenes/coded.rs`).
+//! 5. The values are added to a lattice (`engine/render/splat/lattice/spread.rs`), or to pixels (`engine/render/splat/footprints.rs`).
+//! 6. `PixelReconstructor::tile` (`engine/render/projection/reconstruct.rs`) gathers the planes at pixels from the lattice
+//!    (`engine/render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`core/wavelet/`), and divides by
 //!    weights.
-//! 7. `Sink::picture` (`render/sink/mod.rs`) colours and writes each picture.
+//! 7. `Sink::picture` (`engine/render/sink/mod.rs`) colours and writes each picture.
 //!
 //! # Words
 //!
@@ -123,19 +125,18 @@
 //!
 //! # Rules
 //!
-//! A test reads the sources and checks these rules.
+//! Packages cannot use what their manifests leave out. A test reads the sources and checks the rest.
 //!
-//! - A folder uses only earlier folders of this list: `base`; then `colour`, `remote`, `wavelet` and `view`; then `source`; then `formats` and
-//!   `codec`; then `file`; then `convert`, `render` and `extract`; then `picture`; then `cli`; then the programs.
-//! - `convert`, `render` and `extract` do not use each other: they meet in the coefficient file. Nor do `formats` and `codec`.
+//! - Modules are listed in the order of the data's path, and use only those listed before them.
+//! - `convert` and `render` do not use each other: they meet in the coefficient file.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
-//! - All `unsafe` code is in `base/mapped.rs`.
+//! - All `unsafe` code is in `core/base/mapped.rs`.
 //!
 //! These rules are not checked by that test:
 //!
 //! - `wavesplat-format` knows bytes only. It starts no thread, opens no path and maps no memory.
-//! - `wavelet`, `codec` and `view`, and the kernels in `render/splat`, are pure functions over slices: no files, no clocks.
-//!   `codec/buffer.rs` reuses memory and is the only module with a state.
+//! - `wavelet`, `codec` and `view`, and the kernels in `engine/render/splat`, are pure functions over slices: no files, no clocks.
+//!   `core/codec/buffer.rs` reuses memory and is the only module with a state.
 //! - Bytes are copied out of a memory map before they are parsed.
 //! - The encoder compares the source with the output of the decoder that readers use.
 //! - Results do not depend on the number of threads, the memory budget or the machine. Sums have a fixed order, and all

@@ -63,7 +63,7 @@ fn comments(source: &str) -> String {
 
 /// The keys of the bibliography.
 fn works() -> BTreeSet<String> {
-    let text = read("src/bibliography.md");
+    let text = read("src/core/bibliography.md");
     let key = |line: &str| Some(line.strip_prefix("- **\\[")?.split_once("\\]**")?.0.to_owned());
     text.lines().filter_map(key).collect()
 }

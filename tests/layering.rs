@@ -3,83 +3,59 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The library's modules from the lowest to the highest layer. A module may only use lower ones.
-const LAYERS: [&[&str]; 8] = [
-    &["base"],
-    &["colour", "wavelet", "view", "remote"],
-    &["source"],
-    &["formats", "codec"],
-    &["file"],
-    &["convert", "render", "extract"],
-    &["picture"],
-    &["cli"],
-];
+/// The packages below `src/`, each with its `lib.rs`. What a package may use of others, its `Cargo.toml` says.
+const PACKAGES: [&str; 5] = ["core", "formats", "engine", "jobs", "cli"];
 
-/// The files below `src/` in which each third-party crate may be used.
-const ALLOWED_FILES: [(&str, &[&str]); 34] = [
-    ("memmap2::", &["base/mapped.rs", "base/zeroed.rs"]),
-    ("bytemuck::", &["base/zeroed.rs"]),
-    ("libc::", &["base/mapped.rs"]),
-    ("multiversion::", &["base/vectors.rs"]),
-    ("crossbeam_channel::", &["convert/"]),
-    (
-        "rayon::",
-        &[
-            "convert/mod.rs",
-            "convert/plan.rs",
-            "convert/choose.rs",
-            "convert/sampled.rs",
-            "source/scan.rs",
-            "render/batches/read.rs",
-            "render/batches/sampled.rs",
-            "render/renderer.rs",
-            "render/planes/",
-            "render/slices/",
-            "render/splat/accumulator.rs",
-            "render/splat/footprints.rs",
-            "render/splat/lattice/filtered.rs",
-            "render/splat/lattice_bands.rs",
-            "render/page/block.rs",
-            "render/projection/plan.rs",
-            "render/projection/weight_sums.rs",
-            "render/scenes/overview.rs",
-            "extract/mod.rs",
-            "file/fetch.rs",
-            "file/check.rs",
-            "file/coefficient_file.rs",
-            "file/repack.rs",
-            "file/verify.rs",
-            "cli/common.rs",
-        ],
-    ),
-    ("clap::", &["cli/", "bin/"]),
-    ("clap_complete::", &["cli/generate.rs"]),
-    ("clap_mangen::", &["cli/generate.rs"]),
-    ("toml::", &["cli/config.rs"]),
-    ("indicatif::", &["cli/"]),
-    ("bytesize::", &["cli/"]),
-    ("png::", &["render/sink/"]),
-    ("exr::", &["render/sink/"]),
-    ("colorous::", &["colour/named.rs"]),
-    ("csv::", &["colour/table.rs"]),
-    ("ab_glyph::", &["render/annotate/"]),
-    ("quick_xml::", &["formats/"]),
-    ("flate2::", &["formats/", "extract/sink.rs", "render/page/block.rs"]),
+/// The files below `src/` in which third-party crates may be used, where their package has more.
+const ALLOWED_FILES: [(&str, &[&str]); 19] = [
+    ("memmap2::", &["core/base/mapped.rs", "core/base/zeroed.rs"]),
+    ("bytemuck::", &["core/base/zeroed.rs"]),
+    ("libc::", &["core/base/mapped.rs"]),
+    ("multiversion::", &["core/base/vectors.rs"]),
+    ("colorous::", &["core/colour/named.rs"]),
+    ("csv::", &["core/colour/table.rs"]),
+    ("flate2::", &["formats/", "engine/render/page/block.rs", "jobs/extract/sink.rs"]),
     ("tiff::", &["formats/tif/"]),
     ("hdf5_reader::", &["formats/arrays/hdf5_storage.rs", "formats/hdf5/", "formats/netcdf/"]),
     ("netcdf_reader::", &["formats/netcdf/"]),
     ("zarrs::", &["formats/zarr/"]),
-    ("axum::", &["cli/view/"]),
-    ("hyper::", &["cli/view/server.rs"]),
-    ("hyper_util::", &["cli/view/server.rs"]),
-    ("tokio::", &["cli/view/server.rs"]),
-    ("tower_service::", &["cli/view/server.rs"]),
-    ("getrandom::", &["cli/view/guard.rs"]),
-    ("base64::", &["formats/", "remote/address.rs", "render/page/", "render/sink/page_encoder.rs"]),
-    ("ureq::", &["remote/"]),
-    ("rusty_s3::", &["remote/address.rs"]),
-    ("configparser::", &["remote/profile.rs"]),
-    ("half::f16", &["base/half.rs"]), // its tests
+    ("ureq::", &["engine/remote/"]),
+    ("rusty_s3::", &["engine/remote/address.rs"]),
+    ("configparser::", &["engine/remote/profile.rs"]),
+    ("crossbeam_channel::", &["engine/convert/"]),
+    (
+        "rayon::",
+        &[
+            "core/source/scan.rs",
+            "engine/file/fetch.rs",
+            "engine/file/check.rs",
+            "engine/file/coefficient_file.rs",
+            "engine/file/repack.rs",
+            "engine/file/verify.rs",
+            "engine/convert/mod.rs",
+            "engine/convert/plan.rs",
+            "engine/convert/choose.rs",
+            "engine/convert/sampled.rs",
+            "engine/render/batches/read.rs",
+            "engine/render/batches/sampled.rs",
+            "engine/render/renderer.rs",
+            "engine/render/planes/",
+            "engine/render/slices/",
+            "engine/render/splat/accumulator.rs",
+            "engine/render/splat/footprints.rs",
+            "engine/render/splat/lattice/filtered.rs",
+            "engine/render/splat/lattice_bands.rs",
+            "engine/render/page/block.rs",
+            "engine/render/projection/plan.rs",
+            "engine/render/projection/weight_sums.rs",
+            "engine/render/scenes/overview.rs",
+            "jobs/extract/mod.rs",
+            "cli/common.rs",
+        ],
+    ),
+    ("png::", &["engine/render/sink/"]),
+    ("exr::", &["engine/render/sink/"]),
+    ("ab_glyph::", &["engine/render/annotate/"]),
 ];
 
 fn rust_files(folder: &Path) -> Vec<PathBuf> {
@@ -109,49 +85,28 @@ fn folder_of(path: &str) -> &str {
     path.split('/').next().unwrap().trim_end_matches(".rs")
 }
 
-fn layer(folder: &str) -> Option<usize> {
-    LAYERS.iter().position(|folders| folders.contains(&folder))
-}
-
-#[test]
-fn modules_use_only_lower_layers() {
-    let all = sources();
-    let order = modules(&all.iter().find(|(path, _)| path == "lib.rs").expect("src/lib.rs").1);
-    let at = |folder: &str| order.iter().position(|module| module == folder);
-    for (path, code) in &all {
-        let from = folder_of(path);
-        if matches!(from, "lib" | "bin") {
-            continue;
-        }
-        assert!(!code.contains("crate::{"), "src/{path}: name modules one by one, so that they can be read here");
-        let own = layer(from).unwrap_or_else(|| panic!("{path}: '{from}' is in no layer"));
-        for used in code.split("crate::").skip(1) {
-            let to: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            let Some(other) = layer(&to) else { continue };
-            assert!(to == from || other < own, "src/{path}: {from} may not use {to}");
-            assert!(at(&to) <= at(from), "src/{path}: lib.rs lists {from} before {to}, so it may not use it");
-        }
-    }
-}
-
-/// Folders whose `mod.rs` lists the modules in the order of the data's path: each uses only those listed before it.
-const ORDERED: [&str; 11] = [
-    "base",
+/// Folders that list their modules in the order of the data's path: each uses only those listed before it.
+const ORDERED: [&str; 14] = [
+    "core",
+    "core/base",
+    "core/view",
     "formats/arrays",
-    "view",
-    "file",
-    "render",
-    "render/batches",
-    "render/splat",
-    "render/scenes",
-    "render/projection",
-    "picture",
-    "picture/plan",
+    "engine",
+    "engine/file",
+    "engine/render",
+    "engine/render/batches",
+    "engine/render/splat",
+    "engine/render/scenes",
+    "engine/render/projection",
+    "jobs",
+    "jobs/picture",
+    "jobs/picture/plan",
 ];
 
-/// The modules of a folder, in the order of its `mod.rs`.
+/// The modules of a folder, in the order of its `mod.rs` or `lib.rs`.
 fn listed(folder: &str, all: &[(String, String)]) -> Vec<String> {
-    let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/mod.rs")).expect("a folder with a mod.rs");
+    let root = if PACKAGES.contains(&folder) { "lib" } else { "mod" };
+    let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/{root}.rs")).expect("a folder with modules");
     modules(code)
 }
 
@@ -164,7 +119,8 @@ fn modules(code: &str) -> Vec<String> {
 /// The modules of a folder that a file below it names. `below` is the file's path from there.
 fn siblings<'a>(folder: &str, below: &str, code: &'a str) -> Vec<&'a str> {
     let levels = below.matches('/').count() + usize::from(!below.ends_with("mod.rs"));
-    let (absolute, relative) = (format!("crate::{}::", folder.replace('/', "::")), "super::".repeat(levels));
+    let in_package = folder.split('/').skip(1).map(|room| format!("{room}::")).collect::<String>();
+    let (absolute, relative) = (format!("crate::{in_package}"), "super::".repeat(levels));
     let from_root = code.split(absolute.as_str()).skip(1);
     // A longer chain of `super` leaves the folder.
     let leaves = |at: usize| code[..at].ends_with("super::") || code[at + relative.len()..].starts_with("super");
@@ -202,6 +158,13 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
 }
 
 #[test]
+fn conversion_and_rendering_meet_in_the_coefficient_file_alone() {
+    for (path, code) in sources().into_iter().filter(|(path, _)| path.starts_with("engine/render/")) {
+        assert!(!code.contains("crate::convert"), "src/{path} uses convert");
+    }
+}
+
+#[test]
 fn every_crate_is_used_only_where_it_is_listed() {
     for (path, code) in sources() {
         for (name, allowed) in ALLOWED_FILES {
@@ -231,7 +194,7 @@ fn only_programs_name_options() {
 
 #[test]
 fn only_programs_have_errors_of_usage() {
-    for (path, code) in sources().into_iter().filter(|(path, _)| !knows_options(path) && path != "base/error.rs") {
+    for (path, code) in sources().into_iter().filter(|(path, _)| !knows_options(path) && path != "core/base/error.rs") {
         assert!(!code.contains("Error::usage") && !code.contains("Error::Usage"), "src/{path}: name the setting");
     }
 }
@@ -239,7 +202,7 @@ fn only_programs_have_errors_of_usage() {
 #[test]
 fn unsafe_code_is_in_one_file() {
     for (path, code) in sources() {
-        assert!(path == "base/mapped.rs" || !code.contains("unsafe"), "src/{path}");
+        assert!(path == "core/base/mapped.rs" || !code.contains("unsafe"), "src/{path}");
     }
 }
 

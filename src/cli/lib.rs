@@ -3,7 +3,7 @@
 //! Data or one JSON object goes to standard output; notes and progress go to standard error. `config` reads options
 //! from a file. `render` is all of `wavesplat-render`, and `view` the server of `wavesplat view`, which uses it. `program` runs a program, and ends it with an exit code.
 //!
-//! With the feature `args` alone, other programs can use `input` and `values`: options that name and open frames.
+//! Without the feature `programs`, other programs can use `input` and `values`: options that name and open frames.
 
 #[cfg(feature = "programs")]
 mod advice;
