@@ -68,10 +68,10 @@
 //!
 //! # Packages
 //!
-//! This package is the front of five others, and has the two programs. Each folder below `src/` is a package; the rooms in it
-//! are modules, and use only those listed before them. So the order is nearly the path of the data.
+//! This package re-exports five others and holds the two programs. Each folder below `src/` except `bin` is a package. Its
+//! modules use only those listed before them, so the order is nearly the path of the data.
 //!
-//! | folder | room | content |
+//! | package | module | content |
 //! |---|---|---|
 //! | `core` | `base` | errors, grids, samples, mapped files, output files |
 //! | | `colour` | transfer functions, and the colours of pixels |
@@ -88,14 +88,15 @@
 //! | | `picture` | a request for pictures, resolved and carried out, for the programs, the viewer and Python |
 //! | `cli` | | the options and commands of the programs in `bin/`, and the server of the viewer |
 //!
-//! `formats` and `engine` use `core` and not each other; `jobs` uses all three; `cli` uses `jobs`. The bytes of a coefficient
+//! `formats` and `engine` use `core` but not each other; `jobs` uses all three, and `cli` all four. The bytes of a coefficient
 //! file are a package beside `src/`, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
 //!
 //! # From a request to a pixel
 //!
 //! A [`picture::PictureRequest`] says in plain data what is asked for. Options (`cli/render/args.rs`), the page of the viewer
 //! (`jobs/picture/view_request.rs`) and Python give one. [`picture::run()`] resolves it against the open inputs of a
-//! [`picture::Session`]: `Plan::new` (`jobs/picture/plan/mod.rs`) finds frames, views, colours, ranges and files. Then:
+//! [`picture::Session`]: `Plan::new` (`jobs/picture/plan/mod.rs`) finds frames, views, colours, ranges and files. In the
+//! order of the data:
 //!
 //! 1. `CoefficientFile::open` (`engine/file/coefficient_file.rs`) reads the directory of blocks.
 //! 2. `render` (`engine/render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each view,
@@ -108,6 +109,14 @@
 //!    (`engine/render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`core/wavelet/`), and divides by
 //!    weights.
 //! 7. `Sink::picture` (`engine/render/sink/mod.rs`) colours and writes each picture.
+//!
+//! # To add something
+//!
+//! | what | how |
+//! |---|---|
+//! | an option of pictures, a mode | `jobs/picture/mod.rs` |
+//! | a format of files | `formats/lib.rs` |
+//! | a temporal basis | `core/wavelet/mod.rs` |
 //!
 //! # Words
 //!
@@ -142,14 +151,14 @@
 //! - Results do not depend on the number of threads, the memory budget or the machine. Sums have a fixed order, and all
 //!   operations are correctly rounded or come from `libm`.
 //! - Memory use follows the budget, not the size of the archive.
-//! - All folders transform through the trait `wavelet::TimeBasis`. Its page says what else a new basis needs. A data
+//! - All folders transform through the trait `TimeBasis`. `core/wavelet/mod.rs` says what else a new basis needs. A data
 //!   source of the renderer can be replaced, too: see [`render::Scene`].
 
 pub use wavesplat_core::base::error::{Error, Result};
 pub use wavesplat_core::base::grid::{Grid, Region};
 pub use wavesplat_core::base::sample::SampleType;
 #[doc(inline)]
-pub use wavesplat_core::{base, bibliography, colour, source, view};
+pub use wavesplat_core::{bibliography, colour, view};
 #[doc(inline)]
 pub use wavesplat_engine::{convert, file, remote, render};
 pub use wavesplat_format as format;
@@ -157,6 +166,25 @@ pub use wavesplat_format as format;
 pub use wavesplat_formats as formats;
 #[doc(inline)]
 pub use wavesplat_jobs::{extract, picture};
+
+/// Errors, grids, samples, mapped files and what else all parts use.
+pub mod base {
+    #[doc(inline)]
+    pub use wavesplat_core::base::{
+        address, cancel, choice, description, error, grid, inputs, mapped, progress, report, sample, values,
+    };
+    #[doc(hidden)]
+    pub use wavesplat_core::base::{npy, output, text, time_labels};
+}
+
+/// Frames in order behind one trait, [`FrameSource`](source::FrameSource), wherever they come from.
+pub mod source {
+    #[doc(inline)]
+    pub use wavesplat_core::source::{
+        Archive, ArraySource, CHANNELS, ColourTransform, FrameSource, FrameWindow, GivenTimes, OpenOptions,
+        RegularTimes, Selection, Units, VariableAxis, VariableInfo, read_frames, select, value_range, with_times,
+    };
+}
 
 /// The parts of `wavelet` and `codec` that tests and benchmarks use. This is no public interface: it may change at any time.
 #[doc(hidden)]

@@ -148,10 +148,7 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
             let Some(at) = order.iter().position(|module| module == own) else { continue };
             for used in siblings(folder, below, code) {
                 let Some(other) = order.iter().position(|module| module == used) else { continue };
-                assert!(
-                    other <= at,
-                    "src/{path}: {own} is listed before {used} in {folder}/mod.rs, so it may not use it"
-                );
+                assert!(other <= at, "src/{path}: {own} is listed before {used} in {folder}, so it may not use it");
             }
         }
     }

@@ -224,7 +224,7 @@ impl InputArgs {
             ..self.completed(file)?.options(common.stream_memory())
         };
         let source = formats::open(inputs, &options)?;
-        source.archive().notes.iter().for_each(|n| common.note(n));
+        source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
         narrow(source, frames, remembered(file, "region")?)
     }
 

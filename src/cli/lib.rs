@@ -1,7 +1,8 @@
-//! The parts that the programs share: common options, values of options, progress and exit codes.
+//! The two programs: their options, commands, messages and progress, and the server of the viewer.
 //!
 //! Data or one JSON object goes to standard output; notes and progress go to standard error. `config` reads options
-//! from a file. `render` is all of `wavesplat-render`, and `view` the server of `wavesplat view`, which uses it. `program` runs a program, and ends it with an exit code.
+//! from a file. `commands` has those of `wavesplat`; `render` is all of `wavesplat-render`; `view` is the server of
+//! `wavesplat view`, which uses it. `program` runs a program, and ends it with an exit code.
 //!
 //! Without the feature `programs`, other programs can use `input` and `values`: options that name and open frames.
 

@@ -30,7 +30,7 @@ pub fn note_text(note: &Note) -> String {
 }
 
 /// Fields whose options have other names.
-const OPTIONS: [(&str, &str); 7] = [
+const OPTIONS: [(&str, &str); 8] = [
     ("sample", "dtype"),
     ("big_endian", "endian"),
     ("azimuth", "view"),
@@ -38,6 +38,7 @@ const OPTIONS: [(&str, &str); 7] = [
     ("certify", "error-image"),
     ("limited", "error"),
     ("surfaces", "iso"),
+    ("quick", "fast"),
 ];
 
 /// The name of the option for a field.

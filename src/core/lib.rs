@@ -1,7 +1,5 @@
 //! The parts of wavesplat that everything else uses. The package `wavesplat` explains them, and is what programs depend on.
 
-pub use wavesplat_format as format;
-
 pub mod base;
 pub mod colour;
 pub mod source;

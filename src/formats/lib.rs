@@ -8,8 +8,10 @@
 //!
 //! 1. Make a folder with its `Format`. The folder `shared` has what formats have in common.
 //! 2. Add its line to `FORMATS`.
-//! 3. Name it in `tools/guide/formats.md` and the README, add it to the tests of inputs, and name its crate, if it has
-//!    one, in `tests/layering.rs`.
+//! 3. Name it in `tools/guide/formats.md` and the README, and add it to the tests of inputs. If it needs a crate of its
+//!    own, make a feature of it in the manifests of `formats` and of the root, check it alone in `.ci/run`, and list the
+//!    folder in `tests/layering.rs`.
+//! 4. If it is written, too, add its name to the help of `wavesplat extract` (`cli/commands/extract.rs`).
 
 mod order;
 mod contents;

@@ -32,7 +32,7 @@ pub(crate) fn shape(options: &OpenOptions) -> Result<(Shape, Option<usize>)> {
         return Err(Error::setting("sample", "headerless data needs a type of samples, for example f32"));
     };
     if frames == Some(0) {
-        return Err(Error::setting("dims", "0 frames are nothing"));
+        return Err(Error::setting("dims", "the number of frames must be at least 1"));
     }
     if options.variable.is_some() {
         return Err(Error::setting("variable", "is for files that have names; headerless data has one array"));

@@ -12,21 +12,6 @@ use std::path::{Path, PathBuf};
 /// made the data ([`Error::Input`], [`Error::CoefficientFile`], [`Error::Changed`]), or no one
 /// ([`Error::BoundMissed`]). Messages name fields, files and values. [`Error::remedy`] says what helps, if that is
 /// known.
-///
-/// ```
-/// use wavesplat::base::error::{Error, Remedy};
-/// use wavesplat::formats::open;
-/// use wavesplat::source::OpenOptions;
-///
-/// let dims = Some(vec![4, 4]);
-/// match open(&["run.raw".into()], &OpenOptions { dims, ..OpenOptions::default() }) {
-///     Err(Error::Setting { setting, problem, .. }) => println!("the field {setting} {problem}"),
-///     Err(Error::Io { path, source, .. }) => println!("{} cannot be read: {source}", path.display()),
-///     Err(error) if error.remedy() == Some(Remedy::AllowGaps) => println!("frames are missing: {error}"),
-///     Err(error) => println!("{error}"),
-///     Ok(source) => println!("{:?} voxels", source.archive().grid.dims),
-/// }
-/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -4,8 +4,8 @@ use super::error::{Error, Result};
 use super::output::part_of;
 use std::path::{Path, PathBuf};
 
-/// An error if writing `output`, which may be a numbered name, would replace an input or a frame beside it. `--force`
-/// does not allow that.
+/// An error if writing `output`, which may be a numbered name, would replace an input or a frame beside it,
+/// which no setting allows.
 pub fn spare_inputs(inputs: &[PathBuf], output: &Path) -> Result<()> {
     let real = |path: &Path| path.canonicalize().ok();
     let folder = |path: &Path| real(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));

@@ -3,7 +3,7 @@
 use super::error::{Error, Result};
 use serde::Serialize;
 
-/// The text that `--json` prints.
+/// A report as JSON for people and programs.
 pub fn report_text(report: &impl Serialize) -> Result<String> {
     let text = serde_json::to_string_pretty(&Versioned { schema: 1, report });
     text.map(|text| text + "\n").map_err(|e| Error::setting("json", e.to_string()))

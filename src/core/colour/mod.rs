@@ -259,7 +259,7 @@ impl TransferFunction {
         }
     }
 
-    /// Restores the colours from [`Self::text`]; `None` for any other text.
+    /// Restores the colours from `text`; `None` for any other text.
     pub fn parse(text: &str) -> Option<Self> {
         let numbers = |text: &str| text.split_whitespace().map(|n| n.parse().ok()).collect::<Option<Vec<f64>>>();
         let Some((space, points)) = text.split_once(';') else {

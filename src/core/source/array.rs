@@ -9,6 +9,7 @@ use std::sync::Arc;
 /// An archive whose frames are an array in memory. Clones share the samples.
 ///
 /// ```
+/// # mod wavesplat { pub use wavesplat_core::{base::error::Error, source}; }
 /// use wavesplat::source::{ArraySource, FrameSource};
 ///
 /// let source = ArraySource::from_f32([4, 3, 2], &[0.5; 10 * 4 * 3 * 2])?;

@@ -4,7 +4,7 @@
 //! v(t_j) = sum over k of c_k u_k(t_j)                                                                     (eq 5)
 //! ```
 //!
-//! The rest of the crate transforms through [`TimeBasis`] only: a pair of linear transforms whose coefficients are
+//! All packages transform through [`TimeBasis`] only: a pair of linear transforms whose coefficients are
 //! ordered from coarse to fine. `src/method.md`, section 3, lists the bases. Transforms work on [`LANES`] voxels at a
 //! time, so that plain loops become vector code.
 //!
@@ -14,9 +14,9 @@
 //!    decoding, rendering and extraction need no change: they use the trait.
 //! 2. Append its variant to [`Basis`] in `format/src/window.rs`, and define its inverse in `format/FORMAT.md`, section
 //!    8.
-//! 3. In `convert`, say whether it takes a pyramid and whether it is tried (`choose.rs`), how many coefficients it has
-//!    (`mod.rs`), and under which name its option is stored (`settings.rs`). `BasisName` in `bin/wavesplat/convert.rs`
-//!    is that option.
+//! 3. In `engine/convert`, say whether it takes a pyramid and whether it is tried (`choose.rs`), how many coefficients it
+//!    has (`plan.rs`), and under which name its option is stored (`settings.rs`). `BasisName` in
+//!    `cli/commands/convert/options.rs` is that option.
 //! 4. Add it to the lists of tests: `every_basis` below, `tests/specification.rs`, which decodes it a second time from
 //!    `FORMAT.md`, `tests/golden.rs`, and `BASES` in `tests/common`.
 

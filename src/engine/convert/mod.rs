@@ -78,6 +78,7 @@ pub enum MissingPolicy {
 /// How to convert. [`ConvertConfig::new`] has the defaults; change others by struct update:
 ///
 /// ```
+/// # use wavesplat_engine as wavesplat;
 /// use wavesplat::convert::{Bound, ConvertConfig};
 ///
 /// let config = ConvertConfig { bound: Bound::Rms, window: 16, ..ConvertConfig::new(0.001) };
@@ -150,6 +151,7 @@ impl ConvertConfig {
     /// The defaults, with an error in the samples' unit: 0.1 allows every sample to be off by 0.1.
     ///
     /// ```
+    /// # mod wavesplat { pub use wavesplat_core::{base::error::Error, source}; pub use wavesplat_engine::{convert, file}; }
     /// use wavesplat::convert::{ConvertConfig, convert_to_file};
     /// use wavesplat::file::{CoefficientFile, promise::max_error};
     /// use wavesplat::source::ArraySource;

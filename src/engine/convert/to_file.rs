@@ -14,7 +14,7 @@ use wavesplat_core::source::FrameSource;
 /// progress, other outputs or interrupted conversions see [`super::run()`].
 ///
 /// # Errors
-/// As [`convert`], and [`Error::Io`](crate::Error::Io) where the file cannot be written.
+/// As [`convert`], and [`Error::Io`](wavesplat_core::base::error::Error::Io) where the file cannot be written.
 pub fn convert_to_file(
     source: &mut dyn FrameSource,
     config: &ConvertConfig,

@@ -253,7 +253,7 @@ impl RenderConfig {
             return Err(Error::setting("views", "takes one view or more, with pictures of one size"));
         }
         if self.paired && self.views.len() != self.frames.len() {
-            return Err(Error::setting("views", "and frames in pairs need as many frames as views"));
+            return Err(Error::setting("views", "are paired with frames, so there must be as many of each"));
         }
         if !self.frames.is_sorted() {
             return Err(Error::setting("frames", "takes ascending numbers"));

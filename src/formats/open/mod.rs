@@ -1,5 +1,4 @@
-//! Opens inputs: finds the files, which format each has, by its extension, or by its first bytes where the extension says
-//! nothing, and reads their headers.
+//! Opens inputs: finds the files, recognises each format by its extension or first bytes, and reads the headers.
 
 pub(crate) mod inputs;
 mod magnitude;
@@ -29,6 +28,22 @@ use wavesplat_core::source::{Extent, FrameSource, OpenOptions, VariableInfo};
 /// # Errors
 /// Files that are absent, damaged, of a format or with a feature that is not supported, or unlike the first one;
 /// numbers in names that suggest a missing frame; options that do not apply to the format.
+///
+/// ```
+/// # mod wavesplat { pub use wavesplat_core::{base, source}; pub use wavesplat_formats as formats; }
+/// use wavesplat::base::error::{Error, Remedy};
+/// use wavesplat::formats::open;
+/// use wavesplat::source::OpenOptions;
+///
+/// let dims = Some(vec![4, 4]);
+/// match open(&["run.raw".into()], &OpenOptions { dims, ..OpenOptions::default() }) {
+///     Err(Error::Setting { setting, problem, .. }) => println!("the field {setting} {problem}"),
+///     Err(Error::Io { path, source, .. }) => println!("{} cannot be read: {source}", path.display()),
+///     Err(error) if error.remedy() == Some(Remedy::AllowGaps) => println!("frames are missing: {error}"),
+///     Err(error) => println!("{error}"),
+///     Ok(source) => println!("{:?} voxels", source.archive().grid.dims),
+/// }
+/// ```
 pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     if let [only] = inputs
         && only == Path::new(STANDARD)
@@ -172,7 +187,7 @@ fn refuse_options(path: &Path, format: &Format, options: &OpenOptions) -> Result
     ];
     let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
     let what = match setting {
-        "variable" => "has one array; this is for files that have names",
+        "variable" => "has a single array without a name; leave this out",
         "axes" => "says itself what its axes count; this is for HDF5, NetCDF and Zarr",
         _ if format.holds_frames() => "says itself what it holds; this is for headerless data, leave it out",
         _ => return Ok(()),

@@ -2,6 +2,24 @@
 //!
 //! A [`PictureRequest`] says what is asked for, in plain data. A [`Session`] holds the inputs of pictures. [`run()`]
 //! resolves the request against it (`plan`), renders and writes.
+//!
+//! To add an option of pictures:
+//!
+//! 1. Add its field and default to [`PictureRequest`] (`request.rs`), and say there which fields exclude it.
+//! 2. Add the option to `cli/render/groups.rs`, and set the field there.
+//! 3. Use the field in the step of `plan` that it concerns: the steps are listed in `plan/mod.rs`.
+//! 4. Test it in `tests/cli`, and name it in `tools/guide/pictures.md`. Python takes the field as a keyword.
+//!
+//! If partial sums must agree on it, add it to `PictureSetup` (`engine/render/partial/head.rs`); if a picture's text must
+//! tell it, to `plan/provenance.rs`; if the viewer changes it, to `view_request.rs` and the page (`engine/render/page/web`).
+//!
+//! To add a mode, that is, another kind of picture:
+//!
+//! 1. Implement `Renderer` (`engine/render/renderer.rs`) in a folder of `engine/render`, and choose it by its variant of
+//!    `Mode` in `engine/render/mod.rs`.
+//! 2. Add its name to [`values::ModeName`], and make the variant from the request in `plan/modes.rs`. The compiler then
+//!    lists the steps of `plan` that must know it.
+//! 3. For the viewer, add it to `ViewMode` (`view_request.rs`) and to `controls.html`.
 
 mod reporter;
 pub mod values;

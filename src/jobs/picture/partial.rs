@@ -138,7 +138,7 @@ fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
             return Err(Error::value(
                 "error",
                 "expected",
-                "weighs all blocks of a picture, and a part has some; take certified",
+                "needs all blocks of a picture, and a part has only some; use certified",
             ));
         }
         ModeName::Projection => return Ok(()),

@@ -271,13 +271,13 @@ pub const MOST_VIEWS: u32 = 3600;
 pub(crate) const SLOWEST: f64 = 0.02;
 pub(crate) const FASTEST: f64 = 1000.0;
 
-/// The number that a field takes instead, unless these are frames per second of a movie.
+/// An error that says which numbers are allowed, unless this is a valid frame rate.
 pub fn check_fps(fps: f64) -> std::result::Result<(), String> {
     let is_sound = (SLOWEST..=FASTEST).contains(&fps);
     if is_sound { Ok(()) } else { Err(format!("a number from {SLOWEST} to {FASTEST}")) }
 }
 
-/// The number that a field takes instead, unless this is a speed of time.
+/// An error that says which numbers are allowed, unless this is a valid speed of time.
 pub fn check_speed(speed: f64) -> std::result::Result<(), String> {
     if speed.is_finite() && speed > 0.0 { Ok(()) } else { Err("a number above 0".into()) }
 }

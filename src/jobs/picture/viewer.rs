@@ -131,7 +131,7 @@ impl ViewerSession {
         })
     }
 
-    /// The pictures of a request: their description, then blocks of their numbers. `web/live.js` reads it.
+    /// The pictures of a request: their description, then blocks of their numbers. `engine/render/page/web/live.js` reads it.
     ///
     /// # Errors
     /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
@@ -147,7 +147,7 @@ impl ViewerSession {
         Answer::encode(&mut plan, sink, view.packed, work)
     }
 
-    /// The time series of a point, as `--probe` writes it: lines of comma-separated values. X, Y and Z are shares of the
+    /// The time series of a point, as those that `probe` asks for: lines of comma-separated values. X, Y and Z are shares of the
     /// axes.
     ///
     /// # Errors

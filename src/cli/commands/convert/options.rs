@@ -218,7 +218,7 @@ enum MissingName {
 impl ConvertArgs {
     /// The request that these options make.
     pub(super) fn request(&self) -> Result<ConvertRequest> {
-        let colours = self.transfer_function.as_deref().map(|name| open_colours("--transfer-function", name));
+        let colours = self.transfer_function.as_deref().map(|name| open_colours("transfer_function", name));
         Ok(ConvertRequest {
             tolerance: self.tolerance,
             max_error: self.max_error.clone(),

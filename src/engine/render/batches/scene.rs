@@ -75,6 +75,7 @@ impl RenderConfig {
     /// The defaults: means of all frames of a scene, seen from one view.
     ///
     /// ```
+    /// # mod wavesplat { pub use wavesplat_core::{base::error::Error, source, view}; pub use wavesplat_engine::render; }
     /// use wavesplat::render::{FrameScene, Quantity, RenderConfig};
     /// use wavesplat::source::ArraySource;
     /// use wavesplat::view::camera::View;

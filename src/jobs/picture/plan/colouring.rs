@@ -109,7 +109,7 @@ impl ColouringInput<'_> {
     }
 
     /// The values of the first and the last colour, if small pictures are not needed to find them. Channels range from
-    /// no to full brightness; only their sums along the ray have no limit. With a transfer function, --range applies to
+    /// no to full brightness; only their sums along the ray have no limit. With a transfer function, `range` applies to
     /// samples.
     fn fixed_range(&self, pixel: Pixel) -> Option<(f64, f64)> {
         let range = self.request.range.map(|range| range.0.into());

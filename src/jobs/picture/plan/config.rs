@@ -6,9 +6,9 @@ use super::views::{fixed, views};
 use crate::picture::request::PictureRequest;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::{Grid, Region};
+use wavesplat_core::codec::bound::range_bound;
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::view::footprint::Kernel;
-use wavesplat_engine::convert::range_bound;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::promise::{range_of_shares, share_tolerance};
 use wavesplat_engine::render::{Limit, Mode, RenderConfig, Scene, SplatSource, default_splat_error};
@@ -73,7 +73,7 @@ fn region_of(request: &PictureRequest, whole: &Grid, lod: u32) -> Result<Option<
     Ok(Some(region))
 }
 
-/// The sample error that `--tolerance` allows, in the unit of the samples.
+/// The sample error that `tolerance` allows, in the unit of the samples.
 fn allowed_error(request: &PictureRequest, tolerance: f64, file: Option<&Metadata>) -> Result<f64> {
     let Some(file) = file.filter(|_| request.method == SplatSource::Coefficients) else {
         return Err(Error::setting("tolerance", "leaves out coefficients, so it needs `method` coefficients"));

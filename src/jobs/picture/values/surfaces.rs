@@ -1,4 +1,4 @@
-//! The isosurfaces that `--iso` names.
+//! The isosurfaces that `iso` names.
 
 use super::hex_colour::HexColour;
 use std::fmt;

@@ -59,14 +59,33 @@ fn range<R: Real>(values: &[R]) -> [R; 2] {
     let (mut least, mut most) = ([*first; LANES], [*first; LANES]);
     let (lines, rest) = values.as_chunks::<LANES>();
     for line in lines {
-        for l in 0..LANES {
-            least[l] = if line[l] < least[l] { line[l] } else { least[l] };
-            most[l] = if line[l] > most[l] { line[l] } else { most[l] };
-        }
+        (least, most) = (lower(&least, line), higher(&most, line));
     }
-    let all = || least.iter().chain(&most).chain(rest);
-    let pick = |wins: fn(&R, &R) -> bool| all().fold(*first, |best, v| if wins(v, &best) { *v } else { best });
-    [pick(|a, b| a < b), pick(|a, b| a > b)]
+    let (mut lowest, mut highest) = ([*first], [*first]);
+    for value in least.iter().chain(&most).chain(rest) {
+        (lowest, highest) = (lower(&lowest, &[*value]), higher(&highest, &[*value]));
+    }
+    [lowest[0], highest[0]]
+}
+
+// One loop that changes both ends in place is not always compiled to minima and maxima of vectors.
+
+#[inline(always)]
+fn lower<R: Real, const N: usize>(a: &[R; N], b: &[R; N]) -> [R; N] {
+    let mut out = *a;
+    for l in 0..N {
+        out[l] = if b[l] < a[l] { b[l] } else { a[l] };
+    }
+    out
+}
+
+#[inline(always)]
+fn higher<R: Real, const N: usize>(a: &[R; N], b: &[R; N]) -> [R; N] {
+    let mut out = *a;
+    for l in 0..N {
+        out[l] = if b[l] > a[l] { b[l] } else { a[l] };
+    }
+    out
 }
 
 #[cfg(test)]
