@@ -68,8 +68,8 @@
 //!
 //! # Packages
 //!
-//! This package re-exports five others and holds the two programs. Each folder below `src/` except `bin` is a package. Its
-//! modules use only those listed before them, so the order is nearly the path of the data.
+//! This package re-exports five others and holds the two programs. Each folder below `src/` except `bin` is a package. The
+//! modules of this table use only those listed before them, so the order is nearly the path of the data.
 //!
 //! | package | module | content |
 //! |---|---|---|
@@ -136,16 +136,17 @@
 //!
 //! Packages cannot use what their manifests leave out. A test reads the sources and checks the rest.
 //!
-//! - Modules are listed in the order of the data's path, and use only those listed before them.
+//! - Modules are listed in the order of the data's path, and use only those listed before them, in the folders that
+//!   `tests/layering.rs` names.
 //! - `convert` and `render` do not use each other: they meet in the coefficient file.
+//! - `wavelet`, `codec` and `view`, and the kernels in `engine/render/splat`, are functions over slices: they open no file,
+//!   look at no clock and start no thread but those of rayon. `core/codec/buffer.rs` alone has a state: it reuses memory.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
 //! - All `unsafe` code is in `core/base/mapped.rs`.
 //!
 //! These rules are not checked by that test:
 //!
 //! - `wavesplat-format` knows bytes only. It starts no thread, opens no path and maps no memory.
-//! - `wavelet`, `codec` and `view`, and the kernels in `engine/render/splat`, are pure functions over slices: no files, no clocks.
-//!   `core/codec/buffer.rs` reuses memory and is the only module with a state.
 //! - Bytes are copied out of a memory map before they are parsed.
 //! - The encoder compares the source with the output of the decoder that readers use.
 //! - Results do not depend on the number of threads, the memory budget or the machine. Sums have a fixed order, and all
@@ -171,10 +172,8 @@ pub use wavesplat_jobs::{extract, picture};
 pub mod base {
     #[doc(inline)]
     pub use wavesplat_core::base::{
-        address, cancel, choice, description, error, grid, inputs, mapped, progress, report, sample, values,
+        address, cancel, choice, description, error, grid, inputs, mapped, progress, sample, values,
     };
-    #[doc(hidden)]
-    pub use wavesplat_core::base::{npy, output, text, time_labels};
 }
 
 /// Frames in order behind one trait, [`FrameSource`](source::FrameSource), wherever they come from.
@@ -184,17 +183,6 @@ pub mod source {
         Archive, ArraySource, CHANNELS, ColourTransform, FrameSource, FrameWindow, GivenTimes, OpenOptions,
         RegularTimes, Selection, Units, VariableAxis, VariableInfo, read_frames, select, value_range, with_times,
     };
-}
-
-/// The parts of `wavelet` and `codec` that tests and benchmarks use. This is no public interface: it may change at any time.
-#[doc(hidden)]
-pub mod internal {
-    pub use wavesplat_core::codec::WindowCodec;
-    pub use wavesplat_core::codec::bound::{ErrorBound, difference_up};
-    pub use wavesplat_core::codec::decode::Block;
-    pub use wavesplat_core::codec::encode::Encoder;
-    pub use wavesplat_core::codec::scheme::Scheme;
-    pub use wavesplat_core::wavelet::{LANES, Lane, TimeBasis, basis, synthesis};
 }
 
 #[doc = include_str!("method.md")]

@@ -15,7 +15,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
-use wavesplat::internal::WindowCodec;
+use wavesplat_core::codec::WindowCodec;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Case {

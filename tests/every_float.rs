@@ -14,8 +14,8 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, ConvertConfig, convert};
-use wavesplat::internal::Block;
-use wavesplat::internal::WindowCodec;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::decode::Block;
 use wavesplat_format::{BlockEntry, Reader};
 
 /// Voxels along the edge of a block. A row of blocks along z holds consecutive patterns.

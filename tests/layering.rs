@@ -3,8 +3,22 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The packages below `src/`, each with its `lib.rs`. What a package may use of others, its `Cargo.toml` says.
-const PACKAGES: [&str; 5] = ["core", "formats", "engine", "jobs", "cli"];
+/// The packages below `src/`, each with its `lib.rs`, and those below that it may use.
+const PACKAGES: [(&str, &[&str]); 5] = [
+    ("core", &[]),
+    ("formats", &["core"]),
+    ("engine", &["core"]),
+    ("jobs", &["core", "formats", "engine"]),
+    ("cli", &["core", "formats", "engine", "jobs"]),
+];
+
+/// Modules that may not use some of those that are listed before them.
+const APART: [(&str, &str, &[&str]); 4] = [
+    ("core", "wavelet", &["colour", "source"]),
+    ("core", "codec", &["colour", "source"]),
+    ("core", "view", &["colour", "source", "wavelet", "codec"]),
+    ("engine", "render", &["convert"]),
+];
 
 /// The files below `src/` in which third-party crates may be used, where their package has more.
 const ALLOWED_FILES: [(&str, &[&str]); 19] = [
@@ -81,16 +95,18 @@ fn sources() -> Vec<(String, String)> {
         .collect()
 }
 
-fn folder_of(path: &str) -> &str {
-    path.split('/').next().unwrap().trim_end_matches(".rs")
-}
-
 /// Folders that list their modules in the order of the data's path: each uses only those listed before it.
-const ORDERED: [&str; 14] = [
+const ORDERED: [&str; 27] = [
     "core",
     "core/base",
+    "core/wavelet",
     "core/view",
     "formats/arrays",
+    "formats/netcdf",
+    "formats/npz",
+    "formats/open",
+    "formats/zarr",
+    "formats/vtk_xml/write",
     "engine",
     "engine/file",
     "engine/render",
@@ -98,14 +114,21 @@ const ORDERED: [&str; 14] = [
     "engine/render/splat",
     "engine/render/scenes",
     "engine/render/projection",
+    "engine/render/planes",
+    "engine/render/slices",
+    "engine/render/partial",
+    "engine/render/page",
     "jobs",
+    "jobs/extract",
     "jobs/picture",
+    "jobs/picture/values",
     "jobs/picture/plan",
+    "jobs/picture/series",
 ];
 
 /// The modules of a folder, in the order of its `mod.rs` or `lib.rs`.
 fn listed(folder: &str, all: &[(String, String)]) -> Vec<String> {
-    let root = if PACKAGES.contains(&folder) { "lib" } else { "mod" };
+    let root = if PACKAGES.iter().any(|(package, _)| *package == folder) { "lib" } else { "mod" };
     let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/{root}.rs")).expect("a folder with modules");
     modules(code)
 }
@@ -155,9 +178,40 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
 }
 
 #[test]
-fn conversion_and_rendering_meet_in_the_coefficient_file_alone() {
-    for (path, code) in sources().into_iter().filter(|(path, _)| path.starts_with("engine/render/")) {
-        assert!(!code.contains("crate::convert"), "src/{path} uses convert");
+fn packages_use_only_those_below_them() {
+    for (package, below) in PACKAGES {
+        for (path, code) in sources().into_iter().filter(|(path, _)| path.starts_with(&format!("{package}/"))) {
+            for (other, _) in PACKAGES.iter().filter(|(other, _)| !below.contains(other)) {
+                assert!(!code.contains(&format!("wavesplat_{other}::")), "src/{path} uses {other}");
+            }
+        }
+    }
+}
+
+/// Kernels know no frames, files or colours; conversion and rendering meet in the coefficient file alone.
+#[test]
+fn some_modules_stay_apart() {
+    let all = sources();
+    for (package, module, others) in APART {
+        for (path, code) in &all {
+            let Some(below) = path.strip_prefix(&format!("{package}/")).filter(|below| below.starts_with(module))
+            else {
+                continue;
+            };
+            let used = siblings(package, below, code).into_iter().find(|used| others.contains(used));
+            assert_eq!(used, None, "src/{path} uses it");
+        }
+    }
+}
+
+/// Folders whose functions read and write nothing, look at no clock and start no thread.
+#[test]
+fn kernels_are_pure() {
+    let pure = ["core/wavelet/", "core/codec/", "core/view/", "engine/render/splat/"];
+    for (path, code) in sources().into_iter().filter(|(path, _)| pure.iter().any(|folder| path.starts_with(folder))) {
+        for module in ["fs", "time", "io", "env", "thread", "net", "process"] {
+            assert!(!code.contains(&format!("std::{module}")), "src/{path} uses std::{module}");
+        }
     }
 }
 
@@ -176,7 +230,7 @@ fn every_crate_is_used_only_where_it_is_listed() {
 
 /// Whether a path is of the programs or of what they share: only these know options.
 fn knows_options(path: &str) -> bool {
-    matches!(folder_of(path), "bin" | "cli")
+    path.starts_with("cli/") || path.starts_with("bin/")
 }
 
 #[test]

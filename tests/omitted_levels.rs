@@ -8,9 +8,9 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, ConvertConfig};
 use wavesplat::file::CoefficientFile;
-use wavesplat::internal::Block;
-use wavesplat::internal::WindowCodec;
 use wavesplat::render::{CoefficientScene, Quantity, RenderConfig, SplatSource};
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::decode::Block;
 use wavesplat_format::{BlockEntry, PartKind};
 
 const FRAMES: usize = 16;

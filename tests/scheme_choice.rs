@@ -7,9 +7,9 @@ use crate::common::{settings, stored};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Stencil};
-use wavesplat::internal::Encoder;
-use wavesplat::internal::Scheme;
-use wavesplat::internal::WindowCodec;
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::encode::Encoder;
+use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_format::{Axis, Pyramid};
 use wavesplat_format::{BlockId, EncodedPart};
 

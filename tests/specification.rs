@@ -10,11 +10,11 @@ use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound, ConvertConfig, SchemeConstraint, SpatialPredictor, Stencil};
 use wavesplat::file::CoefficientFile;
-use wavesplat::internal::Block;
-use wavesplat::internal::ErrorBound;
-use wavesplat::internal::Scheme;
-use wavesplat::internal::WindowCodec;
-use wavesplat::internal::{LANES, Lane, basis};
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::bound::ErrorBound;
+use wavesplat_core::codec::decode::Block;
+use wavesplat_core::codec::scheme::Scheme;
+use wavesplat_core::wavelet::{LANES, Lane, basis};
 use wavesplat_format::{Axis, Packing, Window};
 use wavesplat_format::{BlockEntry, PartKind};
 

@@ -3,7 +3,7 @@
 use crate::common::random::Random;
 use crate::reference::transform::{Matrix, apply, ghm_matrix, haar_matrix, inverse, transpose};
 use wavesplat::convert::Basis;
-use wavesplat::internal::{LANES, Lane, TimeBasis, basis};
+use wavesplat_core::wavelet::{LANES, Lane, TimeBasis, basis};
 
 /// The tolerance, relative to the largest number involved.
 const CLOSE: f64 = 1e-12;

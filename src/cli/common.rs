@@ -11,8 +11,8 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::progress::Progress;
-use wavesplat_core::base::report::report_text;
 use wavesplat_jobs::picture::Reporter;
+use wavesplat_jobs::report::report_text;
 
 /// Options that every program and subcommand takes.
 #[derive(Debug, Clone, Args)]

@@ -1,6 +1,5 @@
 //! Options for reading an archive.
 
-#[cfg(feature = "programs")]
 use super::{CommonArgs, RemoteArgs, note_text};
 use super::{Dims, FrameRange, RegionSpec, TimesSpec, Triple, times};
 use clap::{Args, ValueEnum};
@@ -14,7 +13,6 @@ use wavesplat_core::source::{self, FrameSource, OpenOptions, Selection, Variable
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::setting;
 use wavesplat_formats as formats;
-#[cfg(feature = "programs")]
 use wavesplat_jobs::picture::is_coefficient_name;
 
 /// The order of a sample's bytes.
@@ -139,10 +137,7 @@ impl InputArgs {
             memory,
         }
     }
-}
 
-#[cfg(feature = "programs")]
-impl InputArgs {
     /// Opens an archive, and prints notes on how it is read.
     pub fn open(&self, inputs: &[PathBuf], common: &CommonArgs) -> Result<Box<dyn FrameSource>> {
         let source = self.open_quietly(inputs, common.stream_memory())?;
@@ -257,7 +252,6 @@ impl InputArgs {
 }
 
 /// Fills an option that was not given with the value stored in a file.
-#[cfg(feature = "programs")]
 fn complete<T: FromStr<Err: fmt::Display>>(option: &mut Option<T>, file: &CoefficientFile, name: &str) -> Result<()> {
     if option.is_none() {
         *option = remembered(file, name)?;

@@ -4,7 +4,6 @@ use clap::Command;
 use std::borrow::Cow;
 use wavesplat_core::base::error::{Error, Note, Remedy};
 use wavesplat_formats::extensions;
-#[cfg(feature = "programs")]
 use wavesplat_jobs::picture::is_field;
 
 /// The text of an error, with a tip if it has a remedy.
@@ -19,7 +18,6 @@ pub fn error_text(error: &Error, command: &Command) -> String {
 }
 
 /// A text about pictures, with options in place of the fields that it has in backquotes.
-#[cfg(feature = "programs")]
 pub(super) fn picture_text(text: &str) -> String {
     worded(text, |quoted| is_field(quoted).then(|| format!("--{}", name(quoted))))
 }

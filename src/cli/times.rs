@@ -1,6 +1,5 @@
 //! The options of times: those of the user in place of those in the files.
 
-#[cfg(feature = "programs")]
 use super::remembered;
 use super::{InputArgs, Numbers, Pair};
 use std::fs::File;
@@ -8,10 +7,8 @@ use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
-#[cfg(feature = "programs")]
 use wavesplat_core::source::{FrameSource, Units, with_times};
 use wavesplat_core::source::{GivenTimes, RegularTimes};
-#[cfg(feature = "programs")]
 use wavesplat_engine::file::{CoefficientFile, setting};
 
 /// `START,STEP`, or a file with a number for each frame.
@@ -38,11 +35,9 @@ pub(super) fn step(text: &str) -> std::result::Result<f64, String> {
 }
 
 /// The setting of times.
-#[cfg(feature = "programs")]
 pub(super) const TIMES: &str = "times";
 
 /// Its value for times from a file, which other frames cannot reuse.
-#[cfg(feature = "programs")]
 const LIST: &str = "list";
 
 impl InputArgs {
@@ -105,7 +100,6 @@ fn time(line: &[u8]) -> std::result::Result<Option<f64>, String> {
     }
 }
 
-#[cfg(feature = "programs")]
 impl InputArgs {
     /// The value of the setting for the given times.
     pub(super) fn times_setting(&self) -> Option<String> {
@@ -138,7 +132,6 @@ impl InputArgs {
 }
 
 /// The units that a file has.
-#[cfg(feature = "programs")]
 pub(super) fn units(file: &CoefficientFile) -> Units {
     let text = |name| setting(file.metadata(), name).map(String::from);
     let [samples, times, space, calendar] = Units::SETTINGS.map(text);

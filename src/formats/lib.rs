@@ -15,7 +15,9 @@
 
 mod order;
 mod contents;
+#[doc(hidden)]
 pub mod encoding;
+#[doc(hidden)]
 pub mod writer;
 mod numbering;
 mod shared;

@@ -1,4 +1,6 @@
-//! What users ask for, resolved and carried out. The package `wavesplat` explains it, and is what programs depend on.
+//! What needs both coefficient files and the formats of others: requests for pictures, resolved and carried out, and
+//! extraction. The package `wavesplat` explains it, and is what programs depend on.
 
+pub mod report;
 pub mod extract;
 pub mod picture;

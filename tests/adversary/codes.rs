@@ -5,7 +5,7 @@ use crate::bounds::search;
 use crate::common::random::Random;
 use crate::common::tried;
 use std::time::Instant;
-use wavesplat::internal::{TimeBasis, synthesis};
+use wavesplat_core::wavelet::{TimeBasis, synthesis};
 
 /// The target of a series.
 #[derive(Debug, Clone, Copy)]

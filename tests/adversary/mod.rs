@@ -13,7 +13,7 @@ use crate::common::series::{Kind, Mask, extremes};
 use proptest::prelude::*;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound};
-use wavesplat::internal::{LANES, Lane, TimeBasis, basis};
+use wavesplat_core::wavelet::{LANES, Lane, TimeBasis, basis};
 
 /// The attacked encoder: one window in one block, whose first two voxels fix the range.
 #[derive(Debug, Clone)]

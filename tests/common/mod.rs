@@ -21,11 +21,11 @@ use wavesplat::base::progress::Silent;
 use wavesplat::convert::{Basis, ConvertConfig, ConvertReport, MissingPolicy, convert};
 use wavesplat::extract::{ExtractConfig, extract};
 use wavesplat::file::CoefficientFile;
-use wavesplat::internal::Encoder;
 use wavesplat::render::{Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::{FrameSource, read_frames};
 use wavesplat::view::camera::View;
 use wavesplat::view::footprint::Kernel;
+use wavesplat_core::codec::encode::Encoder;
 use wavesplat_format::{BlockId, EncodedBlock, Metadata, WindowEnd, WindowRecord, Writer};
 
 /// A memory budget that suffices for every test.

@@ -45,7 +45,7 @@ impl Format {
     /// Writes the bytes before the samples of an array whose last axis is the fastest.
     fn begin(self, writer: &mut impl Write, ty: SampleType, shape: &[usize]) -> io::Result<()> {
         if self == Self::Npy {
-            wavesplat::base::npy::write_header(ty, shape, writer)?;
+            wavesplat_core::base::npy::write_header(ty, shape, writer)?;
         }
         Ok(())
     }

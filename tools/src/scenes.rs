@@ -3,13 +3,13 @@
 use std::path::Path;
 use wavesplat::base::error::Result;
 use wavesplat::base::grid::Grid;
-use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
 use wavesplat::render::{Mode, Quantity, RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
 use wavesplat::view::footprint::Kernel;
+use wavesplat_core::base::output::Output;
 
 /// Bytes that a conversion or a rendering may allocate.
 pub(crate) const MEMORY: usize = 512 << 20;

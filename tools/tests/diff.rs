@@ -25,7 +25,7 @@ impl Folder {
 
     fn npy(&self, name: &str, ty: SampleType, shape: &[usize], values: &[f64]) -> PathBuf {
         let (mut bytes, mut samples) = (Vec::new(), vec![0; values.len() * ty.size()]);
-        wavesplat::base::npy::write_header(ty, shape, &mut bytes).unwrap();
+        wavesplat_core::base::npy::write_header(ty, shape, &mut bytes).unwrap();
         sample::store(ty, values, &mut samples);
         bytes.extend(samples);
         fs::write(self.path(name), bytes).unwrap();

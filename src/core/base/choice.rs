@@ -80,6 +80,7 @@ impl<'a> Given<'a> {
 }
 
 /// Serialises types as the texts that options accept, and reads them from such texts.
+#[doc(hidden)]
 #[macro_export]
 macro_rules! serde_as_text {
     ($($type:ty),*) => {$(

@@ -7,13 +7,11 @@ pub mod error;
 pub mod progress;
 pub mod cancel;
 pub mod choice;
-pub mod report;
 pub mod memory;
 pub mod vectors;
 pub mod zeroed;
 #[doc(hidden)]
 pub mod text;
-pub mod spread;
 pub(crate) mod half;
 mod calendar;
 pub(crate) mod clock;

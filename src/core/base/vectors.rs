@@ -1,6 +1,6 @@
 //! Runs kernels compiled for the vector units of the machine, chosen when the program runs.
 //!
-//! A kernel is an `#[inline(always)]` function over slices; `dispatch!(kernel(a, b))` calls it compiled for [`level`]. Called
+//! A kernel is an `#[inline(always)]` function over slices; `dispatch!(kernel(a, b))` calls it compiled for `level`. Called
 //! directly, it is compiled for the baseline processor. All levels give the same results.
 //!
 //! Large bodies of loops within kernels are no closures, or `#[inline(always)]` ones: others may stay functions for the baseline
@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 
 /// The vector units that kernels use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Level {
+enum Level {
     /// Those that every processor of the architecture has.
     Baseline,
     /// The best of the machine.
@@ -20,7 +20,7 @@ pub enum Level {
 
 /// The level of this process: the machine's, unless the environment variable `WAVESPLAT_VECTOR_UNITS` is `baseline`.
 #[inline]
-pub fn level() -> Level {
+fn level() -> Level {
     static LEVEL: LazyLock<Level> = LazyLock::new(|| named(std::env::var_os("WAVESPLAT_VECTOR_UNITS").as_deref()));
     *LEVEL
 }
@@ -33,7 +33,7 @@ fn named(name: Option<&OsStr>) -> Level {
 // know that slices do not overlap.
 macro_rules! runners {
     ($($run:ident($($argument:ident: $Type:ident),+);)+) => {$(
-        /// Runs a kernel compiled for [`level`].
+        /// Runs a kernel compiled for `level`.
         #[inline]
         #[allow(clippy::too_many_arguments, reason = "the kernel's, and the kernel")]
         pub fn $run<$($Type,)+ R>(kernel: impl Fn($($Type),+) -> R, $($argument: $Type),+) -> R {
@@ -70,7 +70,8 @@ runners! {
     run7(a: A, b: B, c: C, d: D, e: E, f: F1, g: G);
 }
 
-/// Calls an `#[inline(always)]` kernel compiled for the vector units of [`level`].
+/// Calls an `#[inline(always)]` kernel compiled for the vector units of `level`.
+#[doc(hidden)]
 #[macro_export]
 macro_rules! dispatch {
     ($kernel:ident $(::<$($generic:tt),+>)? ($($argument:expr),+ $(,)?)) => {

@@ -17,7 +17,7 @@ use crate::base::vectors::dispatch;
 
 /// The Haar basis for one window.
 #[derive(Debug)]
-pub struct Haar {
+pub(crate) struct Haar {
     frames: usize,
     /// The rotations (a, b) of each step, fine to coarse.
     steps: Vec<Vec<(f64, f64)>>,

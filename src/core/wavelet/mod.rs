@@ -25,10 +25,10 @@ mod learned;
 mod multi;
 mod samples;
 
-pub use haar::Haar;
+pub(crate) use haar::Haar;
 pub use learned::Learned;
-pub use multi::Multi;
-pub use samples::Samples;
+pub(crate) use multi::Multi;
+pub(crate) use samples::Samples;
 pub use wavesplat_format::Basis;
 
 use crate::base::error::{Error, Result};

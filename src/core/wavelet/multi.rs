@@ -46,7 +46,7 @@ const END_WAVELET: [f64; 4] = [-10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 
 
 /// The multiwavelet basis for one window.
 #[derive(Debug)]
-pub struct Multi {
+pub(crate) struct Multi {
     frames: usize,
     intervals: usize,
 }

@@ -4,7 +4,7 @@ use super::{Lane, TimeBasis};
 
 /// The identity transform.
 #[derive(Debug)]
-pub struct Samples(pub(super) usize);
+pub(crate) struct Samples(pub(super) usize);
 
 impl TimeBasis for Samples {
     fn frames(&self) -> usize {

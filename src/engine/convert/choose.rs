@@ -8,12 +8,12 @@
 
 use super::learn::learned_functions;
 use super::smoothness::{AXES, roughest_first};
+use super::spread::evenly;
 use super::{ConvertConfig, Pool};
 use rayon::prelude::*;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
-use wavesplat_core::base::spread::evenly;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};

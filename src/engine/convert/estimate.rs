@@ -3,6 +3,7 @@
 use super::coded_input::CodedInput;
 use super::gather::{Batch, WindowReader};
 use super::record::WindowWriter;
+use super::spread::evenly;
 use super::variation::Variation;
 use super::warnings::Findings;
 use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Target, WindowJob, WindowsDone, encode_batch};
@@ -18,7 +19,6 @@ use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{self, join_ranges};
-use wavesplat_core::base::spread::evenly;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::range_bound;
 use wavesplat_core::codec::encode::Encoded;

@@ -31,6 +31,7 @@ pub mod sampled;
 mod settings;
 pub mod shard;
 mod smoothness;
+mod spread;
 mod to_file;
 mod variation;
 mod warnings;

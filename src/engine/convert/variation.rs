@@ -1,7 +1,7 @@
 //! How much voxels vary over time, from a few voxels of every block: what an allowed error is compared with.
 
+use super::spread::evenly;
 use wavesplat_core::base::sample::{self, SampleType};
-use wavesplat_core::base::spread::evenly;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 
 /// Approximate number of voxels sampled per window.

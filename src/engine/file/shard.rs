@@ -75,11 +75,6 @@ impl ShardPlace {
         }
         Ok(Self { archive: id.to_string(), frames, all })
     }
-
-    /// Whether the file is a shard of a longer archive.
-    pub fn is_part(&self) -> bool {
-        self.frames != (0..self.all)
-    }
 }
 
 /// The metadata that shards share: those with which one conversion would begin.

@@ -35,7 +35,7 @@ mod viewer;
 
 pub use report::Outcome;
 pub use reporter::{Caller, Reporter};
-pub use request::{PictureRequest, option};
+pub use request::PictureRequest;
 pub use run::run;
 pub use session::{Inputs, Session};
 pub use view_request::ViewRequest;

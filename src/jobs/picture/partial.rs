@@ -17,13 +17,13 @@ use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::session::Session;
 use super::values::ModeName;
+use crate::report::report_text;
 use serde::Serialize;
 use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::inputs::spare_inputs;
 use wavesplat_core::base::output::Output;
-use wavesplat_core::base::report::report_text;
 use wavesplat_engine::file::shard::ShardPlace;
 use wavesplat_engine::file::{CoefficientFile, setting};
 use wavesplat_engine::render::partial::{
@@ -138,7 +138,7 @@ fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
             return Err(Error::value(
                 "error",
                 "expected",
-                "needs all blocks of a picture, and a part has only some; use certified",
+                "needs all blocks of a picture, and a part has only some; take certified",
             ));
         }
         ModeName::Projection => return Ok(()),

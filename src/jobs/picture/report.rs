@@ -5,11 +5,11 @@ use super::plan::modes::mode_name;
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::values::ModeName;
+use crate::report::report_text;
 use serde::Serialize;
 use std::io::Write;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::Output;
-use wavesplat_core::base::report::report_text;
 use wavesplat_engine::render::RenderReport;
 use wavesplat_engine::render::sink::{Provenance, is_ours};
 

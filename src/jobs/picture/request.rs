@@ -332,7 +332,7 @@ fn is_other(name: &str, fields: &[&str]) -> bool {
 }
 
 /// The name of the option of a field.
-pub fn option(field: &str) -> String {
+pub(crate) fn option(field: &str) -> String {
     field.replace('_', "-")
 }
 

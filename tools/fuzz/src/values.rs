@@ -4,7 +4,8 @@ use super::input::Input;
 use std::fmt::{Debug, Display};
 use std::str::FromStr;
 use wavesplat::base::grid::Grid;
-use wavesplat_cli::{Dims, FrameList, FrameRange, Pair, RegionSpec, Size, Triple, Whole};
+use wavesplat::base::values::{FrameList, FrameRange, Pair, RegionSpec, Triple, Whole};
+use wavesplat_cli::{Dims, Size};
 
 /// Parses text as every kind of value, for an archive of at most 999 frames and 256 voxels along an axis.
 pub fn values(data: &[u8]) {

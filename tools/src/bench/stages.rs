@@ -12,7 +12,6 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::ConvertConfig;
 use wavesplat::file::CoefficientFile;
@@ -20,6 +19,7 @@ use wavesplat::formats;
 use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, Scene, SplatSource};
 use wavesplat::source::{FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
+use wavesplat_core::base::output::Output;
 
 /// Converts frames to a coefficient file.
 #[derive(Debug, Clone, Serialize, Deserialize)]

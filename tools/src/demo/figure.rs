@@ -3,9 +3,9 @@
 use super::{Demo, Run};
 use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, titled, with_bar};
 use wavesplat::base::error::Result;
-use wavesplat::base::output::Output;
 use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::source::CHANNELS;
+use wavesplat_core::base::output::Output;
 
 /// The frames that are shown.
 const SHOWN: [usize; 4] = [5, 10, 15, 20];

@@ -6,7 +6,7 @@ use super::report::number;
 use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, heat, titled, with_bar};
 use std::path::Path;
 use wavesplat::base::error::Result;
-use wavesplat::base::output::Output;
+use wavesplat_core::base::output::Output;
 
 /// The largest number of frames shown.
 const SHOWN: usize = 16;

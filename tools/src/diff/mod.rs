@@ -13,9 +13,10 @@ use measure::Differences;
 use ssim::{Picture, Scope, ssim};
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::output::Output;
+use wavesplat::base::inputs::spare_inputs;
 use wavesplat::base::sample::SampleType;
-use wavesplat_cli::{self as cli, spare_inputs};
+use wavesplat_cli as cli;
+use wavesplat_core::base::output::Output;
 
 // Each paragraph is one line, which is broken to fit the terminal.
 const HELP: &str = "\

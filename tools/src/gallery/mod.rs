@@ -16,16 +16,17 @@ use std::sync::Arc;
 use tiles::{SampleStyle, Tile, short};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Region;
-use wavesplat::base::output::Output;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
+use wavesplat::base::values::Numbers;
 use wavesplat::colour::{Distribution, TransferFunction};
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat::file::CoefficientFile;
 use wavesplat::render::{CoefficientScene, Mode, OverviewRequest, RenderConfig, Scene, SplatSource, Thinning};
 use wavesplat::source::FrameSource;
 use wavesplat::view::camera::View;
-use wavesplat_cli::{InputArgs, Numbers};
+use wavesplat_cli::InputArgs;
+use wavesplat_core::base::output::Output;
 
 /// The default archives.
 pub const USUAL: [&str; 2] = ["demo", "smooth"];

@@ -3,9 +3,9 @@
 use crate::sheet::{Image, Rgb};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
+use wavesplat::colour::OpacityPoints;
 use wavesplat::colour::{Clear, Distribution, Norm, Scale, TransferFunction};
 use wavesplat::render::{Light, Mode, Surface};
-use wavesplat_cli::OpacityPoints;
 
 const BACKGROUND: Rgb = [0; 3];
 /// Rays reach the stated opacities over these shares of the volume's smallest extent: for haze, and for shells, which

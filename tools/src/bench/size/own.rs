@@ -16,10 +16,10 @@ use wavesplat::base::sample;
 use wavesplat::convert::{ConvertReport, convert};
 use wavesplat::file::CoefficientFile;
 use wavesplat::formats;
-use wavesplat::internal::Block;
-use wavesplat::internal::WindowCodec;
-use wavesplat::internal::difference_up;
 use wavesplat::source::{OpenOptions, read_frames};
+use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::bound::difference_up;
+use wavesplat_core::codec::decode::Block;
 
 /// The settings of a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]

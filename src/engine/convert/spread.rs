@@ -1,7 +1,7 @@
 //! Places that spread evenly over a volume, however many there are.
 
-/// A place below `counts`: number `number` of the sequence of [Roberts](crate::bibliography).
-pub fn evenly(number: usize, counts: [usize; 3]) -> [usize; 3] {
+/// A place below `counts`: number `number` of the sequence of [Roberts](wavesplat_core::bibliography).
+pub(super) fn evenly(number: usize, counts: [usize; 3]) -> [usize; 3] {
     std::array::from_fn(|axis| {
         let position = (0.5 + GOLDEN[axis] * number as f64).fract();
         (position * counts[axis] as f64) as usize

@@ -1,7 +1,7 @@
 //! Reports as JSON.
 
-use super::error::{Error, Result};
 use serde::Serialize;
+use wavesplat_core::base::error::{Error, Result};
 
 /// A report as JSON for people and programs.
 pub fn report_text(report: &impl Serialize) -> Result<String> {
