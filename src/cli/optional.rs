@@ -66,9 +66,9 @@ mod tests {
     #[test]
     fn a_number_is_the_options_value_and_a_file_is_an_input() {
         for (line, expected) in [
-            ("test info --share 0.1 src", "test info --share=0.1 src"),
-            ("test info src --share 1e-3", "test info src --share=1e-3"),
-            ("test info --share src", "test info --share src"),
+            ("test info --share 0.1 lib.rs", "test info --share=0.1 lib.rs"),
+            ("test info lib.rs --share 1e-3", "test info lib.rs --share=1e-3"),
+            ("test info --share lib.rs", "test info --share lib.rs"),
             ("test info --share *.npy", "test info --share *.npy"),
             ("test info --share --json", "test info --share --json"),
             ("test info --share -", "test info --share -"),
@@ -78,6 +78,6 @@ mod tests {
         ] {
             assert_eq!(join(line).as_deref(), Some(expected));
         }
-        assert_eq!(join("test info src --share 1%"), None);
+        assert_eq!(join("test info lib.rs --share 1%"), None);
     }
 }

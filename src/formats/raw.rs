@@ -124,7 +124,7 @@ mod tests {
         let of = |dims: &[usize]| OpenOptions { dims: Some(dims.into()), ..options(None, SampleType::F32) };
         refused(&file, &of(&[2, 2]), "not 2 number(s)");
         refused(&file, &of(&[2, 0, 2]), "is empty");
-        refused(&file, &of(&[2, 2, 2, 0]), "0 frames");
+        refused(&file, &of(&[2, 2, 2, 0]), "frames must be at least 1");
         refused(&file, &of(&[usize::MAX, 2, 2]), "too large");
         refused(&file, &of(&[2, 2, 2, usize::MAX]), "too large");
         refused(&file, &OpenOptions { sample: None, ..of(&[2, 2, 2]) }, "sample: headerless data needs");

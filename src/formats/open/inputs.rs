@@ -289,6 +289,6 @@ mod tests {
             refused(&file, &options, &format!("{setting}: {headerless}"));
         }
         let named = OpenOptions { variable: Some("a".into()), ..OpenOptions::default() };
-        refused(&file, &named, "a.npy has one array; this is for files that have names");
+        refused(&file, &named, "a.npy has a single array without a name; leave this out");
     }
 }
