@@ -99,15 +99,17 @@
 //! order of the data:
 //!
 //! 1. `CoefficientFile::open` (`engine/file/coefficient_file.rs`) reads the directory of blocks.
-//! 2. `render` (`engine/render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each view,
-//!    `Sliced` or `Planes`. All loop over batches of frames with `for_each_batch` (`engine/render/batches/driver.rs`).
+//! 2. `render` (`engine/render/mod.rs`) chooses the `Renderer` of the mode: `Projection`, which makes a `ViewSetup` of each
+//!    view, `Sliced` or `Planes`. All loop over batches of frames with `for_each_batch` (`engine/render/batches/driver.rs`).
 //! 3. `Scene::open` (`engine/render/scenes/coefficients.rs`) selects the blocks of a batch, and the parts of them to read.
-//! 4. `splat` (`engine/render/splat/`) asks for each block by `FrameBatch::planes`. That reads it (`engine/file/coefficient_file.rs`), decodes
-//!    it (`core/codec/decode.rs`) and gives the values of its planes (`engine/render/scenes/coded.rs`).
-//! 5. The values are added to a lattice (`engine/render/splat/lattice/spread.rs`), or to pixels (`engine/render/splat/footprints.rs`).
+//! 4. `splat` (`engine/render/splat/`) asks for each block by `FrameBatch::planes`. That reads it
+//!    (`engine/file/coefficient_file.rs`), decodes it (`core/codec/decode.rs`) and gives the values of its planes
+//!    (`engine/render/scenes/coded.rs`).
+//! 5. The values are added to a lattice (`engine/render/splat/lattice/spread.rs`), or to pixels
+//!    (`engine/render/splat/footprints.rs`).
 //! 6. `PixelReconstructor::tile` (`engine/render/projection/reconstruct.rs`) gathers the planes at pixels from the lattice
-//!    (`engine/render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`core/wavelet/`), and divides by
-//!    weights.
+//!    (`engine/render/splat/lattice/gather.rs`), turns planes into frames by `TimeBasis::inverse` (`core/wavelet/`), and
+//!    divides by weights.
 //! 7. `Sink::picture` (`engine/render/sink/mod.rs`) colours and writes each picture.
 //!
 //! # To add something
@@ -138,7 +140,8 @@
 //!
 //! - Modules are listed in the order of the data's path, and use only those listed before them, in the folders that
 //!   `tests/layering.rs` names.
-//! - `convert` and `render` do not use each other: they meet in the coefficient file.
+//! - `convert`, `render` and `extract` do not use each other: they meet in the coefficient file. Nor do `formats` and
+//!   `codec`.
 //! - `wavelet`, `codec` and `view`, and the kernels in `engine/render/splat`, are functions over slices: they open no file,
 //!   look at no clock and start no thread but those of rayon. `core/codec/buffer.rs` alone has a state: it reuses memory.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
@@ -152,7 +155,7 @@
 //! - Results do not depend on the number of threads, the memory budget or the machine. Sums have a fixed order, and all
 //!   operations are correctly rounded or come from `libm`.
 //! - Memory use follows the budget, not the size of the archive.
-//! - All folders transform through the trait `TimeBasis`. `core/wavelet/mod.rs` says what else a new basis needs. A data
+//! - All packages transform through the trait `TimeBasis`. `core/wavelet/mod.rs` says what else a new basis needs. A data
 //!   source of the renderer can be replaced, too: see [`render::Scene`].
 
 pub use wavesplat_core::base::error::{Error, Result};

@@ -1,4 +1,5 @@
-//! Values of options of the programs alone; those that requests hold are in `wavesplat_core::base::values` and `wavesplat_jobs::picture::values`.
+//! Values of options of the programs alone; those that requests hold are in `wavesplat_core::base::values`
+//! and `wavesplat_jobs::picture::values`.
 
 use std::fmt;
 use std::str::FromStr;

@@ -54,14 +54,14 @@ pub enum OutputFiles {
     EachFrame,
     /// One for each frame in a folder, with this extension, and a list of them.
     List {
-        /// Of the list.
+        /// The extension of the frames' files.
         extension: &'static str,
-        /// Writes it.
+        /// Writes the list.
         write: WriteList,
     },
     /// One for all frames, with this extension, and a header beside it.
     WithHeader {
-        /// Of the samples.
+        /// The extension of the file of samples.
         extension: &'static str,
         /// Writes the header.
         write: WriteHeader,

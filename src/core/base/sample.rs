@@ -255,7 +255,8 @@ pub fn rounding(ty: SampleType, magnitude: f64) -> f64 {
 }
 
 /// The largest absolute value in a range; 0 if it is empty.
-pub fn magnitude((lo, hi): (f64, f64)) -> f64 {
+pub fn magnitude(range: (f64, f64)) -> f64 {
+    let (lo, hi) = range;
     if lo <= hi { (-lo).max(hi) } else { 0.0 }
 }
 

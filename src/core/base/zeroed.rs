@@ -8,7 +8,7 @@ use std::ops::{Deref, DerefMut};
 
 /// A buffer of numbers, zero at first.
 pub enum Zeroed<T> {
-    /// Small.
+    /// A small buffer.
     Heap(Vec<T>),
     /// The map and the length in numbers. Pages that are never written take no memory.
     Map(MmapMut, usize),

@@ -143,7 +143,8 @@ impl CoefficientFile {
     /// fit.
     ///
     /// # Errors
-    /// [`Error::CoefficientFile`](wavesplat_core::base::error::Error::CoefficientFile) for a block that is damaged or that the file lacks.
+    /// [`Error::CoefficientFile`](wavesplat_core::base::error::Error::CoefficientFile) for a block that is damaged or that
+    /// the file lacks.
     pub fn read_blocks(&self, ids: &[BlockId]) -> Result<Vec<Vec<u8>>> {
         let mut blocks = Vec::with_capacity(ids.len());
         for ids in ids.chunk_by(|a, b| a.window == b.window) {

@@ -14,7 +14,8 @@ use wavesplat_engine::file::CoefficientFile;
 /// Files of colours have three channels. This reads the first; [`super::extract`] reads any.
 ///
 /// # Errors
-/// [`Error::Setting`](wavesplat_core::base::error::Error::Setting) if the file lacks a frame or voxel, and those of reading a damaged file.
+/// [`Error::Setting`](wavesplat_core::base::error::Error::Setting) if the file lacks a frame or voxel, and those of reading
+/// a damaged file.
 pub fn read_region(file: &CoefficientFile, frames: Range<usize>, region: &Region) -> Result<Vec<f32>> {
     let (sample, declared) = (file.sample(), file.metadata().missing_value);
     let config = ExtractConfig { frames: frames.collect(), region: *region, ..ExtractConfig::new(file) };

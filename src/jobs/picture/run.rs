@@ -14,7 +14,8 @@ use wavesplat_engine::render::render;
 /// Writes what a request asks for.
 ///
 /// # Errors
-/// Those of opening, rendering and writing; [`Error::Setting`](wavesplat_core::base::error::Error::Setting) names fields of the request.
+/// Those of opening, rendering and writing; [`Error::Setting`](wavesplat_core::base::error::Error::Setting) names fields of
+/// the request.
 pub fn run(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Outcome> {
     if request.is_for_series() {
         write_series(session, request, reporter)

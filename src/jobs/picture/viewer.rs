@@ -131,7 +131,8 @@ impl ViewerSession {
         })
     }
 
-    /// The pictures of a request: their description, then blocks of their numbers. `engine/render/page/web/live.js` reads it.
+    /// The pictures of a request: their description, then blocks of their numbers, as `engine/render/page/web/live.js`
+    /// reads them.
     ///
     /// # Errors
     /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
@@ -147,8 +148,8 @@ impl ViewerSession {
         Answer::encode(&mut plan, sink, view.packed, work)
     }
 
-    /// The time series of a point, as those that `probe` asks for: lines of comma-separated values. X, Y and Z are shares of the
-    /// axes.
+    /// The time series of a point, in the format of `probe`: lines of comma-separated values. X, Y and Z are shares of
+    /// the axes.
     ///
     /// # Errors
     /// Inputs that are no coefficient file, or reads that fail.
