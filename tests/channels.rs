@@ -266,17 +266,17 @@ fn a_looser_tolerance_reads_less_of_colours_and_keeps_to_it() {
     let plain = looking(view(40.0, 20.0, [60, 50]), 0.0, Quantity::Mean, &grid, 16);
     let (exact, whole) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &plain);
     assert_eq!((whole.blocks, whole.left_out.coefficients), (3 * file.open().blocks.len() as u64, 0));
-    for limited in [Limit::Certified, Limit::Expected] {
-        let loose = RenderConfig { allowed: Some(ALLOWED), limited, ..plain.clone() };
+    for error in [Limit::Certified, Limit::Expected] {
+        let loose = RenderConfig { allowed: Some(ALLOWED), error, ..plain.clone() };
         let (found, report) = pictures(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &loose);
         let (left, read) = (report.left_out.coefficients, report.bytes_read);
-        assert!(left > 0 && read < whole.bytes_read, "{limited:?}: {left} left out, {read} of {}", whole.bytes_read);
-        assert!(limited == Limit::Expected || report.certified_sample_error <= ALLOWED);
+        assert!(left > 0 && read < whole.bytes_read, "{error:?}: {left} left out, {read} of {}", whole.bytes_read);
+        assert!(error == Limit::Expected || report.certified_sample_error <= ALLOWED);
         assert!(report.expected_error > whole.expected_error && report.expected_error <= ALLOWED);
         let squares: Vec<f64> =
             exact.iter().zip(&found).filter(|(a, _)| !a.is_nan()).map(|(a, b)| f64::from(a - b).powi(2)).collect();
         let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        assert!(rms > 0.0 && rms <= ALLOWED, "{limited:?}: {rms}");
+        assert!(rms > 0.0 && rms <= ALLOWED, "{error:?}: {rms}");
     }
 }
 

@@ -47,7 +47,7 @@ struct View {
 impl View {
     fn of(memory: &Memory, ty: SampleType, (azimuth, elevation, tau): (f64, f64, f64), quantity: Quantity) -> Self {
         let config = looking(view(azimuth, elevation, [40, 30]), tau, quantity, &GRID, FRAMES);
-        let config = RenderConfig { limited: Limit::Expected, ..config };
+        let config = RenderConfig { error: Limit::Expected, ..config };
         let mean = RenderConfig { quantity: Quantity::Mean, ..config.clone() };
         let picture = |memory: &Memory, config| pictures(&mut direct(memory, None), config).0;
         let shown: Vec<bool> = picture(memory, &mean).iter().map(|v| !v.is_nan()).collect();

@@ -176,7 +176,7 @@ fn a_quick_look_reports_an_estimate() {
     for (azimuth, elevation) in [(0.0, 0.0), (30.0, 30.0), (10.0, 80.0)] {
         let view = View { scale: Some(3.0), ..view(azimuth, elevation, [120, 120]) };
         let exact = looking(view, 0.0, Quantity::Mean, &grid, 2);
-        let quick = RenderConfig { splat_error: 1e-3, quick: true, ..exact.clone() };
+        let quick = RenderConfig { splat_error: 1e-3, fast: true, ..exact.clone() };
         let (found, report) = pictures(&mut direct(&memory, None), &quick);
         assert!(report.views[0].splat_error_is_estimate && report.views[0].method == "lattice-fast");
         let (expected, report_of_exact) = pictures(&mut direct(&memory, None), &exact);
@@ -186,9 +186,9 @@ fn a_quick_look_reports_an_estimate() {
         assert!(largest > 0.0 && largest < 0.05 * span(&samples), "{azimuth}: {largest:e}");
     }
     let config =
-        RenderConfig { quick: true, certify: true, ..looking(view(0.0, 0.0, [9, 9]), 0.0, Quantity::Mean, &grid, 2) };
+        RenderConfig { fast: true, certify: true, ..looking(view(0.0, 0.0, [9, 9]), 0.0, Quantity::Mean, &grid, 2) };
     let refused = wavesplat::render::check(&direct(&memory, None), &config);
-    assert!(matches!(refused, Err(wavesplat::base::error::Error::Setting { setting: "quick", .. })));
+    assert!(matches!(refused, Err(wavesplat::base::error::Error::Setting { setting: "fast", .. })));
 }
 
 fn masked(samples: &[f64], missing: impl Fn(usize) -> bool) -> Vec<f64> {

@@ -86,8 +86,8 @@ fn every_view_of_a_run_equals_the_view_rendered_alone() {
         each_as_alone(&mut direct(&memory, None), &config);
         let certified = RenderConfig { certify: true, ..config.clone() };
         each_as_alone(&mut CoefficientScene::new(haar.open(), SplatSource::Coefficients), &certified);
-        let limited = RenderConfig { allowed: Some(0.2), limited: Limit::Expected, ..config };
-        each_as_alone(&mut CoefficientScene::new(auto.open(), SplatSource::Coefficients), &limited);
+        let loose = RenderConfig { allowed: Some(0.2), error: Limit::Expected, ..config };
+        each_as_alone(&mut CoefficientScene::new(auto.open(), SplatSource::Coefficients), &loose);
     }
 }
 

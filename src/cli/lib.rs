@@ -15,7 +15,6 @@ mod generate;
 mod input;
 mod json_progress;
 mod messages;
-mod optional;
 mod program;
 mod remote;
 pub mod render;

@@ -28,15 +28,13 @@ pub fn note_text(note: &Note) -> String {
 }
 
 /// Fields whose options have other names.
-const OPTIONS: [(&str, &str); 8] = [
+const OPTIONS: [(&str, &str); 6] = [
     ("sample", "dtype"),
     ("big_endian", "endian"),
     ("azimuth", "view"),
     ("elevation", "view"),
     ("certify", "error-image"),
-    ("limited", "error"),
     ("surfaces", "iso"),
-    ("quick", "fast"),
 ];
 
 /// The name of the option for a field.

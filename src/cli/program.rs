@@ -3,7 +3,7 @@
 use super::advice;
 use super::common::note;
 use super::config::Config;
-use super::{commands, messages, optional, render};
+use super::{commands, messages, render};
 use clap::error::ErrorKind;
 use clap::{Command, CommandFactory, Parser};
 use std::env;
@@ -44,7 +44,6 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
 /// The command line, and the file of options.
 fn arguments<A: Parser>() -> Result<(Vec<OsString>, Config)> {
     let (command, args) = (command::<A>(), env::args_os().collect::<Vec<_>>());
-    let args = optional::joined(&command, &args)?;
     let config = Config::read(&command, &args)?;
     Ok((args, config))
 }

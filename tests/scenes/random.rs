@@ -117,7 +117,7 @@ fn look(grid: &Grid, frames: usize, limits: &Limits, random: &mut Random) -> Ren
         frames: some(frames, random),
         region: random.one_in(4).then(|| region(grid, random)),
         splat_error: if random.one_in(4) { 0.0 } else { error },
-        quick: false,
+        fast: false,
         certify: !random.one_in(3),
         allowed: random.one_in(6).then(|| random.about((1e-6, 10.0))),
         ..plain

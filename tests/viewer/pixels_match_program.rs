@@ -78,11 +78,11 @@ fn certified_errors_hold_for_the_pictures() {
     browser.wait("player.shown?.beneath");
     let [coded, error] = ["beneath", "planes[0]"]
         .map(|of| browser.js(&format!("Array.from(player.shown.{of}, v => Number.isNaN(v) ? null : v)")));
-    let look = browser.js("JSON.stringify(steering.live.request([0, 1], true))");
+    let look = browser.js("JSON.stringify(steering.live.request([0, 1], true).look)");
     let raw = Served::start(&work, "a.npy");
     browser.open(&raw.address);
     let read = format!(
-        "steering.live.post('pictures', {{ ...{}, certify: false, range: null, clear: null }}).then(a => a.arrayBuffer()).then(async b => \
+        "steering.live.post('pictures', {{ look: {{ ...{}, range: null, clear: null }} }}).then(a => a.arrayBuffer()).then(async b => \
          Array.from((await readBlock(new Uint8Array(b).subarray(4 + new DataView(b).getUint32(0, true)))).pictures[0][0], v => Number.isNaN(v) ? null : v))",
         look.as_str().unwrap()
     );

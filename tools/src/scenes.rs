@@ -39,9 +39,9 @@ pub(crate) fn projection(
         paired: false,
         region: None,
         splat_error,
-        quick: false,
+        fast: false,
         allowed: None,
-        limited: Default::default(),
+        error: Default::default(),
         certify: false,
         memory: MEMORY,
     })

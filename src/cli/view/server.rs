@@ -216,7 +216,8 @@ async fn command(
     Query(query): Query<HashMap<String, String>>,
     body: Bytes,
 ) -> std::result::Result<String, Failed> {
-    Ok(server.session.command(&view_request(&body)?, saved(&query)?))
+    let (request, saved) = (view_request(&body)?, saved(&query)?);
+    server.session.command(&request, saved).map_err(|e| Failed(StatusCode::BAD_REQUEST, e.to_string()))
 }
 
 async fn save(

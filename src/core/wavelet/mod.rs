@@ -14,9 +14,8 @@
 //!    decoding, rendering and extraction need no change: they use the trait.
 //! 2. Append its variant to [`Basis`] in `format/src/window.rs`, and define its inverse in `format/FORMAT.md`, section
 //!    8.
-//! 3. In `engine/convert`, say whether it takes a pyramid and whether it is tried (`choose.rs`), how many coefficients it
-//!    has (`plan.rs`), and under which name its option is stored (`settings.rs`). `BasisName` in
-//!    `cli/commands/convert/options.rs` is that option.
+//! 3. Name it in [`AnyBasis`]: options, requests and files have that name. In `engine/convert`, say whether it takes a
+//!    pyramid and whether it is tried (`choose.rs`), and how many coefficients it has (`plan.rs`).
 //! 4. Add it to the lists of tests: `every_basis` below, `tests/specification.rs`, which decodes it a second time from
 //!    `FORMAT.md`, `tests/golden.rs`, and `BASES` in `tests/common`.
 
@@ -31,9 +30,23 @@ pub(crate) use multi::Multi;
 pub(crate) use samples::Samples;
 pub use wavesplat_format::Basis;
 
+use crate::base::choice::Choice;
 use crate::base::error::{Error, Result};
 use std::fmt::Debug;
 use std::ops::Range;
+
+/// A basis, or `None` for whichever suits.
+pub type AnyBasis = Option<Basis>;
+
+impl Choice for AnyBasis {
+    const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
+        ("haar", Some(Basis::Haar), "Haar wavelets"),
+        ("multi", Some(Basis::Multi), "The multiwavelet of Geronimo, Hardin and Massopust"),
+        ("learned", Some(Basis::Learned), "Orthonormal functions learned from the window's own series"),
+        ("pyramid", Some(Basis::Samples), "No transform along time: samples are predicted in space and time"),
+        ("auto", None, "learned or pyramid, whichever variant makes a few sample boxes of the window smallest"),
+    ];
+}
 
 /// The number of voxels transformed together.
 pub const LANES: usize = 8;

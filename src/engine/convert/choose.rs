@@ -11,6 +11,7 @@ use super::smoothness::{AXES, roughest_first};
 use super::spread::evenly;
 use super::{ConvertConfig, Pool};
 use rayon::prelude::*;
+use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
@@ -42,6 +43,15 @@ pub enum SpatialPredictor {
     Alone,
     /// A pyramid with this stencil.
     Pyramid(Stencil),
+}
+
+impl Choice for SpatialPredictor {
+    const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
+        ("none", Self::Alone, "No prediction: each series by itself"),
+        ("linear", Self::Pyramid(Stencil::Linear), "From two neighbours along an axis"),
+        ("cubic", Self::Pyramid(Stencil::Cubic), "From four neighbours along an axis"),
+        ("auto", Self::Any, "linear or cubic, whichever makes a few sample boxes smaller"),
+    ];
 }
 
 impl SchemeConstraint {

@@ -48,12 +48,13 @@ use rayon::prelude::*;
 use record::WindowWriter;
 pub use request::ConvertRequest;
 pub use run::{Failure, append, run};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 pub use to_file::convert_to_file;
+use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::description::{Description, is_of};
 use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::memory;
@@ -67,13 +68,19 @@ pub use wavesplat_format::{Basis, Packing, Stencil};
 use wavesplat_format::{BlockId, CompletePrefix, Features, FileId, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MissingPolicy {
     /// Reject the input; the error names the first one and their number.
     Error,
     /// Keep their bits; they add nothing to pictures.
     Mask,
+}
+
+impl Choice for MissingPolicy {
+    const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
+        ("error", Self::Error, "Reject the input, and name the first one"),
+        ("mask", Self::Mask, "Keep them; they add nothing to pictures"),
+    ];
 }
 
 /// How to convert. [`ConvertConfig::new`] has the defaults; change others by struct update:

@@ -2,9 +2,10 @@
 
 use super::plan::check_max_error;
 use super::shard::{ArchiveScan, Shard, sharded};
-use super::{CHAIN, ConvertConfig, MaxError, MissingPolicy, SchemeConstraint, SpatialPredictor, settings};
+use super::{CHAIN, ConvertConfig, MaxError, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use serde::{Deserialize, Deserializer, de::Error as _};
 use std::path::PathBuf;
+use wavesplat_core::base::choice;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::memory;
 use wavesplat_core::colour::TransferFunction;
@@ -27,6 +28,7 @@ pub struct ConvertRequest {
     pub range: Option<(f64, f64)>,
     /// What to do with missing samples. Default: mask them if a value means "missing", by `missing_value` or by what the
     /// source declares; else refuse them.
+    #[serde(with = "choice::optional")]
     pub missing: Option<MissingPolicy>,
     /// A value that means "missing", besides NaN and infinities. Default: the one that the source declares.
     #[serde(deserialize_with = "number")]
@@ -37,10 +39,10 @@ pub struct ConvertRequest {
     #[serde(deserialize_with = "colours")]
     pub transfer_function: Option<TransferFunction>,
     /// The transform along time: haar, multi, learned, pyramid or auto. Default: auto, the smallest.
-    #[serde(deserialize_with = "settings::basis")]
+    #[serde(with = "choice")]
     pub basis: Option<Basis>,
     /// Prediction in space: none, linear, cubic or auto. Default: what suits the basis.
-    #[serde(deserialize_with = "settings::space")]
+    #[serde(with = "choice::optional")]
     pub space: Option<SpatialPredictor>,
     /// Frames in a window. Default: 32, and 33 for the basis multi.
     pub window: Option<usize>,
@@ -105,6 +107,7 @@ impl ConvertRequest {
             check_max_error(self.bound, has_range, self.transfer_function.is_some())?;
         }
         let (setting, what) = match (&self.scan, self.shard) {
+            _ if self.lacks_prediction() => ("space", "none takes `basis` haar, multi or learned"),
             _ if self.range.is_some_and(|(lo, hi)| lo > hi) => ("range", "give the lower end first"),
             (Some(_), _) if has_range || is_exact => {
                 ("scan", "gives the range that a tolerance refers to; leave `range` and `max_error` out")
@@ -119,6 +122,11 @@ impl ConvertRequest {
             _ => return Ok(()),
         };
         Err(Error::setting(setting, what))
+    }
+
+    /// Whether samples would be coded in place, which takes a prediction, without one.
+    fn lacks_prediction(&self) -> bool {
+        self.space == Some(SpatialPredictor::Alone) && matches!(self.basis, None | Some(Basis::Samples))
     }
 
     /// The frames to convert, which are those of the shard, and the configuration that suits them.

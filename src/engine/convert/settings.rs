@@ -4,26 +4,23 @@ use super::coded_input::CodedInput;
 use super::{CHAIN, ConvertConfig, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use crate::file::promise::{MAX_ERROR, max_error};
 use crate::file::setting;
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer};
 use std::str::FromStr;
+use wavesplat_core::base::choice::Choice;
 use wavesplat_core::codec::CLIP;
-use wavesplat_core::codec::scheme::Stencil;
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{ColourTransform, Units};
-use wavesplat_core::wavelet::Basis;
+use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_format::Metadata;
 
 /// The settings of a conversion, without those that the metadata holds.
 pub(super) fn stored_settings(input: &CodedInput) -> Vec<(String, String)> {
     let CodedInput { config, archive, colour_transform } = input;
     let ConvertConfig { coding, window, level, missing, range, .. } = config;
-    let (basis, space) = (word(&BASES, coding.basis), word(&SPACES, coding.space));
-    let missing = if *missing == MissingPolicy::Mask { "mask" } else { "error" };
+    let (basis, space) = (coding.basis.name(), coding.space.name());
     let range = range.map(|(lo, hi)| ("range", format!("{lo:?},{hi:?}")));
     let max_error = config.max_error.map(|error| (MAX_ERROR, format!("{error:?}")));
     let given = [("basis", basis.into()), ("space", space.into()), ("window", window.to_string())];
-    let more = [("level", level.to_string()), ("missing", missing.into())];
+    let more = [("level", level.to_string()), ("missing", missing.name().into())];
     let all = given
         .into_iter()
         .chain(more)
@@ -43,7 +40,8 @@ impl ConvertConfig {
     /// The configuration of the conversion that wrote a file, to append to it; none if the file's settings are incomplete.
     pub fn from_file(file: &Metadata, memory: usize) -> Option<Self> {
         let named = |name: &str| setting(file, name);
-        let (basis, space) = (meaning(&BASES, named("basis")?)?, meaning(&SPACES, named("space")?)?);
+        let basis = AnyBasis::named(named("basis")?).ok()?;
+        let space = SpatialPredictor::named(named("space")?).ok()?;
         let max_error = max_error(file);
         let range = match named("range") {
             _ if max_error.is_some() => None,
@@ -132,47 +130,3 @@ fn is_own(file: &Metadata, name: &str) -> bool {
 
 /// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
 const OWN: [&str; 9] = [MAX_ERROR, CLIP.0, "chain", "basis", "space", "window", "level", "missing", "range"];
-
-/// A table of words, as options, requests and files have them, and what they mean.
-type Words<T, const N: usize> = [(&'static str, T); N];
-
-/// The transforms along time. No basis means that any is allowed.
-const BASES: Words<Option<Basis>, 5> = [
-    ("auto", None),
-    ("haar", Some(Basis::Haar)),
-    ("multi", Some(Basis::Multi)),
-    ("learned", Some(Basis::Learned)),
-    ("pyramid", Some(Basis::Samples)),
-];
-
-/// The predictions in space.
-const SPACES: Words<SpatialPredictor, 4> = [
-    ("auto", SpatialPredictor::Any),
-    ("none", SpatialPredictor::Alone),
-    ("linear", SpatialPredictor::Pyramid(Stencil::Linear)),
-    ("cubic", SpatialPredictor::Pyramid(Stencil::Cubic)),
-];
-
-fn word<T: PartialEq + Copy, const N: usize>(words: &Words<T, N>, value: T) -> &'static str {
-    words.iter().find(|(_, known)| *known == value).expect("every value has a word").0
-}
-
-fn meaning<T: Copy, const N: usize>(words: &Words<T, N>, word: &str) -> Option<T> {
-    words.iter().find(|(known, _)| *known == word).map(|(_, value)| *value)
-}
-
-/// Reads the word of a basis.
-pub(super) fn basis<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Basis>, D::Error> {
-    read(&BASES, from)
-}
-
-/// Reads the word of a prediction in space.
-pub(super) fn space<'de, D: Deserializer<'de>>(from: D) -> Result<Option<SpatialPredictor>, D::Error> {
-    read(&SPACES, from).map(Some)
-}
-
-fn read<'de, T: Copy, D: Deserializer<'de>, const N: usize>(words: &Words<T, N>, from: D) -> Result<T, D::Error> {
-    let word = String::deserialize(from)?;
-    meaning(words, &word)
-        .ok_or_else(|| D::Error::custom(format!("{word} is none of {}", words.map(|(w, _)| w).join(", "))))
-}

@@ -161,13 +161,13 @@ pub struct RenderConfig {
     pub splat_error: f64,
     /// Whether a quick look is enough: about twice as fast, with a splat error that is estimated, not bounded. Default:
     /// no.
-    pub quick: bool,
+    pub fast: bool,
     /// The error that pictures may have, in the unit of samples. A larger limit reads and splats less. `None` keeps the
     /// precision of the file; it is the default. For an emission, the limit is the error of a picture whose samples all
     /// have this error.
     pub allowed: Option<f64>,
     /// The error that `allowed` limits. Default: the certified error.
-    pub limited: Limit,
+    pub error: Limit,
     /// Whether each picture comes with an error bound for every pixel. Default: no.
     pub certify: bool,
     /// Limit of allocated memory in bytes, without the memory of the sink. Default: 512 MiB.
@@ -244,7 +244,7 @@ impl RenderConfig {
 
     /// Whether the selection of blocks depends on the view.
     pub(super) fn chooses_by_view(&self) -> bool {
-        self.allowed.is_some() && self.limited == Limit::Expected
+        self.allowed.is_some() && self.error == Limit::Expected
     }
 
     /// An error unless a scene with this number of frames can be rendered with these settings. `None` means unknown.
@@ -266,8 +266,8 @@ impl RenderConfig {
         if !(self.splat_error.is_finite() && self.splat_error >= 0.0) {
             return Err(Error::setting("splat_error", "takes a number of 0 or more"));
         }
-        if self.quick && self.certify {
-            return Err(Error::setting("quick", "has no bound, so it cannot be certified"));
+        if self.fast && self.certify {
+            return Err(Error::setting("fast", "has no bound, so it cannot be certified"));
         }
         self.mode.check()?;
         if self.mode.is_projection() {
@@ -276,8 +276,8 @@ impl RenderConfig {
         let refused = [
             (self.kernel.tau != 0.0, "tau"),
             (self.certify, "certify"),
-            (self.quick, "quick"),
-            (self.chooses_by_view(), "limited"),
+            (self.fast, "fast"),
+            (self.chooses_by_view(), "error"),
             (self.quantity != Quantity::Mean, "quantity"),
         ];
         let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));

@@ -189,7 +189,7 @@ fn shared_setup(
         quantity: config.quantity,
         kernel: config.kernel,
         splat_error: config.splat_error,
-        quick: config.quick,
+        fast: config.fast,
         tolerance: request.tolerance.zip(config.allowed),
         views: config.views.clone(),
         paired: config.paired.then(|| config.frames.clone()),

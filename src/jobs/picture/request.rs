@@ -208,16 +208,25 @@ impl PictureRequest {
     /// A text that is no JSON object, an unknown field, a wrong value, or fields that exclude one another.
     pub fn from_json(json: &str) -> Result<Self> {
         let given: Map<String, Value> = serde_json::from_str(json).map_err(wrong)?;
-        for (name, value) in &given {
-            let alone = Map::from_iter([(name.clone(), value.clone())]);
-            serde_json::from_value::<Self>(alone.into()).map_err(|e| wrong(format!("`{name}`: {e}")))?;
-        }
+        let request = Self::default().with(&given)?;
         let pairs = given.keys().flat_map(|a| given.keys().map(move |b| (a, b)));
         if let Some((a, b)) = pairs.into_iter().find(|(a, b)| exclude(a, b)) {
             return Err(wrong(format!("`{a}` cannot be used with `{b}`")));
         }
-        let request: Self = serde_json::from_value(given.into()).map_err(wrong)?;
         request.check().map(|()| request)
+    }
+
+    /// This request with other values of some fields.
+    pub(super) fn with(&self, given: &Map<String, Value>) -> Result<Self> {
+        for (name, value) in given {
+            let alone = Map::from_iter([(name.clone(), value.clone())]);
+            serde_json::from_value::<Self>(alone.into()).map_err(|e| wrong(format!("`{name}`: {e}")))?;
+        }
+        let own = serde_json::to_value(self).map_err(wrong)?;
+        let mut fields: Map<String, Value> = serde_json::from_value(own).map_err(wrong)?;
+        fields.extend(given.clone());
+        let changed: Self = serde_json::from_value(fields.into()).map_err(wrong)?;
+        Ok(Self { output: self.output.clone(), certify: self.certify, ..changed })
     }
 
     /// An error unless all numbers are within their limits.

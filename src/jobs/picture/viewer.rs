@@ -1,7 +1,7 @@
 //! Pictures for a page that asks for them: facts about a scene, a page with them, and pictures by request.
 
 use super::plan::Plan;
-use super::plan::config::render_config;
+use super::plan::config::{frames_of, render_config};
 use super::plan::opened::Opened;
 use super::plan::ranges::distribution;
 use super::plan::ranges::distribution_of_frames;
@@ -137,15 +137,22 @@ impl ViewerSession {
     /// # Errors
     /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
     pub fn pictures(&self, view: &ViewRequest, work: &CancelToken) -> Result<Vec<u8>> {
-        let request = view.applied_for_colours(&self.base);
-        let mut plan = Plan::new(&self.session, &request, &Caller(work))?;
-        plan.config.frames.retain(|frame| view.wants(*frame));
+        let request = view.applied_to(&self.base)?;
+        let mut plan = Plan::new(&self.session, &self.with_frames_for_colours(&request), &Caller(work))?;
+        let wanted = frames_of(&request, plan.scene.frames().unwrap_or(0))?;
+        plan.config.frames.retain(|frame| wanted.binary_search(frame).is_ok());
         if plan.config.frames.is_empty() {
-            return Err(Error::setting("frames", "the archive has none of these"));
+            return Err(Error::setting("frames", "the viewer shows none of these"));
         }
         let sink = SinkConfig { shown: plan.config.shown(), ..plan.sinks(&request).config()? };
-        view.check_memory(sink.pixel.numbers(), plan.config.memory)?;
+        check_memory(&sink, plan.config.memory)?;
         Answer::encode(&mut plan, sink, view.packed, work)
+    }
+
+    /// The request for all frames of the viewer if their values determine the colours.
+    fn with_frames_for_colours(&self, request: &PictureRequest) -> PictureRequest {
+        let decides = if request.range.is_none() { &self.base } else { request };
+        PictureRequest { frames: decides.frames.clone(), ..request.clone() }
     }
 
     /// The time series of a point, in the format of `probe`: lines of comma-separated values. X, Y and Z are shares of
@@ -194,7 +201,7 @@ impl ViewerSession {
     /// Writes the pictures of a request.
     fn write(&self, view: &ViewRequest, saved: Saved, out: Output, work: &CancelToken) -> Result<()> {
         let output = saved.name().into();
-        let request = PictureRequest { output, certify: false, ..view.applied_to(&self.base) };
+        let request = PictureRequest { output, certify: false, ..view.applied_to(&self.base)? };
         let mut plan = Plan::new(&self.session, &request, &Caller(work))?;
         let config = SinkConfig { shown: plan.config.shown(), ..plan.sinks(&request).config()? };
         let mut sink = Sink::to_output(out, config)?;
@@ -203,13 +210,16 @@ impl ViewerSession {
     }
 
     /// The command that draws a request.
-    pub fn command(&self, view: &ViewRequest, saved: Saved) -> String {
-        let request = PictureRequest { certify: false, ..view.applied_to(&self.base) };
+    ///
+    /// # Errors
+    /// Those of [`ViewRequest::applied_to`].
+    pub fn command(&self, view: &ViewRequest, saved: Saved) -> Result<String> {
+        let request = PictureRequest { certify: false, ..view.applied_to(&self.base)? };
         let inputs = self.session.paths().iter().map(|path| path.to_string_lossy().into_owned());
         let words =
             request.words().into_iter().chain(view.certify.then(|| format!("--{}=error.npy", option("error_image"))));
         let all = inputs.chain(self.input_words.iter().cloned()).chain(words).chain(["-o".into(), saved.name().into()]);
-        all.fold("wavesplat-render".into(), |line, word| line + " " + &quoted(&word))
+        Ok(all.fold("wavesplat-render".into(), |line, word| line + " " + &quoted(&word)))
     }
 }
 
@@ -283,6 +293,17 @@ impl Histogram {
         let end = if hi - common >= common - lo { hi } else { lo };
         Self { range, counts, surface: Some((common + end) / 2.0) }
     }
+}
+
+/// Refuses pictures of more numbers than half of the memory takes.
+fn check_memory(sink: &SinkConfig, memory: usize) -> Result<()> {
+    let numbers = sink.size[0] * sink.size[1] * sink.pixel.numbers();
+    let bytes = numbers.saturating_mul(sink.shown.len()).saturating_mul(2 * size_of::<f32>());
+    if bytes <= memory / 2 {
+        return Ok(());
+    }
+    let what = format!("{memory} bytes are too few for this many frames at once: they take {bytes}");
+    Err(Error::setting("memory", what))
 }
 
 /// The opacities of a composite, at shares of its range.

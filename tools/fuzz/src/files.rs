@@ -125,8 +125,8 @@ pub fn render(data: &[u8]) {
         let mut scene = CoefficientScene::from(file);
         let plain = RenderConfig::new(&scene, view);
         let mode = if mode % 3 == 0 { Mode::Mip { slices: None } } else { Mode::Projection };
-        let (quick, certify) = (how % 2 == 1, how % 4 == 2);
-        let config = RenderConfig { mode, frames, quick, certify, memory: 256 << 20, ..plain };
+        let (fast, certify) = (how % 2 == 1, how % 4 == 2);
+        let config = RenderConfig { mode, frames, fast, certify, memory: 256 << 20, ..plain };
         let _ = wavesplat::render::render(&mut scene, &config, &Silent, &mut |_| Ok(()));
     });
 }

@@ -162,9 +162,9 @@ fn pictures(
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         frames: (0..task.frames).collect(),
         splat_error,
-        quick: false,
+        fast: false,
         allowed: allowed.map(|(allowed, _)| allowed),
-        limited: allowed.map(|(_, limit)| limit).unwrap_or_default(),
+        error: allowed.map(|(_, limit)| limit).unwrap_or_default(),
         memory: MEMORY,
         ..RenderConfig::new(scene, CameraSettings::first(task.dims, SIZE).view())
     };

@@ -247,7 +247,7 @@ fn by_library(
         kernel: Kernel::new(Some(SIGMA), 0.0, scene.grid())?,
         frames: (0..step.frames).collect(),
         splat_error: step.splat_error,
-        quick: false,
+        fast: false,
         certify,
         memory: MEMORY,
         ..RenderConfig::new(scene, camera.view())

@@ -1,12 +1,14 @@
 //! The options of `wavesplat convert`, and the request that they make.
 
 use super::given::GivenOptions;
+use crate::choice::choice;
 use crate::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
 use clap::{Arg, Args, ValueEnum};
 use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_engine::convert::shard::Shard;
-use wavesplat_engine::convert::{Basis, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor, Stencil};
+use wavesplat_engine::convert::{Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
 use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::open_colours;
 
@@ -62,8 +64,8 @@ pub(crate) struct ConvertArgs {
     pub(super) range: Option<Pair>,
     /// What to do with NaN, infinities and the missing value: reject them, or keep them as they are [default: error;
     /// mask with --missing-value, and for files that declare a missing value]
-    #[arg(long, value_enum, help_heading = ERROR_BOUND)]
-    missing: Option<MissingName>,
+    #[arg(long, value_parser = choice::<MissingPolicy>(), help_heading = ERROR_BOUND)]
+    missing: Option<MissingPolicy>,
     /// Clamp decoded samples to the window's original minimum and maximum, so that non-negative data stay non-negative.
     /// Pictures from coefficients are not affected
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value = "false", hide_default_value = true, hide_possible_values = true, action = clap::ArgAction::Set, help_heading = ERROR_BOUND)]
@@ -102,11 +104,11 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "F", help_heading = CODING)]
     pub(super) transfer_function: Option<String>,
     /// Transform along time
-    #[arg(long, value_enum, default_value = "auto", help_heading = CODING)]
-    basis: BasisName,
+    #[arg(long, value_parser = choice::<AnyBasis>(), default_value = "auto", help_heading = CODING)]
+    basis: AnyBasis,
     /// Prediction of coefficients in space [default: none for haar and multi, else auto]
-    #[arg(long, value_enum, help_heading = CODING)]
-    space: Option<SpaceName>,
+    #[arg(long, value_parser = choice::<SpatialPredictor>(), help_heading = CODING)]
+    space: Option<SpatialPredictor>,
     /// Frames in a window: a power of two for haar [default: 32], one more for multi [default: 33]
     #[arg(long, value_name = "T", help_heading = CODING)]
     window: Option<usize>,
@@ -169,32 +171,6 @@ wavesplat-render --splat-error). --bound sampled is AN ESTIMATE, NOT A GUARANTEE
 than the mean, and single frames, may be off by many times the tolerance.";
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum BasisName {
-    /// Haar wavelets
-    Haar,
-    /// The multiwavelet of Geronimo, Hardin and Massopust
-    Multi,
-    /// Orthonormal functions learned from the window's own series
-    Learned,
-    /// No transform along time: samples are predicted in space and time
-    Pyramid,
-    /// learned or pyramid, whichever variant makes a few sample boxes of the window smallest
-    Auto,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SpaceName {
-    /// No prediction: each series by itself
-    None,
-    /// From two neighbours along an axis
-    Linear,
-    /// From four neighbours along an axis
-    Cubic,
-    /// linear or cubic, whichever makes a few sample boxes smaller
-    Auto,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
 enum BoundName {
     /// Every sample: error <= tolerance x value range
     Pointwise,
@@ -207,14 +183,6 @@ enum BoundName {
     Sampled,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum MissingName {
-    /// Reject the input, and name the first one
-    Error,
-    /// Keep them; they add nothing to pictures
-    Mask,
-}
-
 impl ConvertArgs {
     /// The request that these options make.
     pub(super) fn request(&self) -> Result<ConvertRequest> {
@@ -224,15 +192,12 @@ impl ConvertArgs {
             max_error: self.max_error.clone(),
             bound: self.bound()?,
             range: self.range()?,
-            missing: self.missing.map(|missing| match missing {
-                MissingName::Error => MissingPolicy::Error,
-                MissingName::Mask => MissingPolicy::Mask,
-            }),
+            missing: self.missing,
             missing_value: self.missing_value,
             clip: self.clip,
             transfer_function: colours.transpose()?,
-            basis: self.basis(),
-            space: self.space()?,
+            basis: self.basis,
+            space: self.space,
             window: self.window,
             block: self.block,
             level: self.level,
@@ -274,29 +239,6 @@ impl ConvertArgs {
             BoundName::Pointwise | BoundName::Rms => return Ok(Some((lo, hi))),
         };
         Err(Error::usage(format!("--range: with --bound {refers_to}, not to a range")))
-    }
-
-    fn basis(&self) -> Option<Basis> {
-        match self.basis {
-            BasisName::Haar => Some(Basis::Haar),
-            BasisName::Multi => Some(Basis::Multi),
-            BasisName::Learned => Some(Basis::Learned),
-            BasisName::Pyramid => Some(Basis::Samples),
-            BasisName::Auto => None,
-        }
-    }
-
-    fn space(&self) -> Result<Option<SpatialPredictor>> {
-        Ok(match self.space {
-            None => None,
-            Some(SpaceName::None) if matches!(self.basis, BasisName::Pyramid | BasisName::Auto) => {
-                return Err(Error::usage("--space none: takes --basis haar, multi or learned"));
-            }
-            Some(SpaceName::None) => Some(SpatialPredictor::Alone),
-            Some(SpaceName::Linear) => Some(SpatialPredictor::Pyramid(Stencil::Linear)),
-            Some(SpaceName::Cubic) => Some(SpatialPredictor::Pyramid(Stencil::Cubic)),
-            Some(SpaceName::Auto) => Some(SpatialPredictor::Any),
-        })
     }
 
     /// The settings that `append` and `verify --against` need to read the same samples again.

@@ -27,7 +27,7 @@ pub(crate) struct InfoArgs {
     inputs: Vec<PathBuf>,
     /// For frames: convert a few blocks, and estimate the size of the coefficient file at this tolerance [a table of
     /// five tolerances if none is given]
-    #[arg(long, value_name = "X", value_parser = share, num_args = 0..=1, require_equals = true)]
+    #[arg(long, value_name = "X", value_parser = tolerance, num_args = 0..=1)]
     estimate: Option<Option<f64>>,
     #[command(flatten)]
     select: SelectArgs,
@@ -37,6 +37,11 @@ pub(crate) struct InfoArgs {
     remote: RemoteArgs,
     #[command(flatten)]
     common: CommonArgs,
+}
+
+/// Reads a tolerance. An input that follows the option is a mistake that people make.
+fn tolerance(text: &str) -> std::result::Result<f64, String> {
+    share(text).map_err(|what| format!("{what}. For a table of five tolerances, write --estimate after the inputs"))
 }
 
 pub(crate) fn run(args: &InfoArgs) -> Result<()> {

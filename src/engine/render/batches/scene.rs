@@ -96,9 +96,9 @@ impl RenderConfig {
             paired: false,
             region: None,
             splat_error: default_splat_error(scene.tolerance()),
-            quick: false,
+            fast: false,
             allowed: None,
-            limited: Limit::Certified,
+            error: Limit::Certified,
             certify: false,
             memory: memory::DEFAULT,
         }

@@ -48,7 +48,7 @@ pub struct PictureSetup {
     /// The requested splat error.
     pub splat_error: f64,
     /// Whether the splat error is an estimate.
-    pub quick: bool,
+    pub fast: bool,
     /// The tolerance of pictures as a share of the range, and in the unit of the samples.
     pub tolerance: Option<(f64, f64)>,
     /// The views, with pictures of one size.
@@ -156,9 +156,9 @@ impl PictureSetup {
             paired: self.paired.is_some(),
             region: None,
             splat_error: self.splat_error,
-            quick: self.quick,
+            fast: self.fast,
             allowed: self.tolerance.map(|(_, allowed)| allowed),
-            limited: Limit::Certified,
+            error: Limit::Certified,
             certify: false,
             memory,
         }
@@ -178,7 +178,6 @@ impl PictureSetup {
             "whole" | "grid" => "lattice".into(),
             "kernel" => "sigma or tau".into(),
             "paired" => "frames of views".into(),
-            "quick" => "fast".into(),
             "direct" => "method".into(),
             key => key.replace('_', " "),
         };

@@ -81,7 +81,7 @@ pub fn render_sums(
 fn clipped_projection(scene: &dyn Scene, config: &RenderConfig) -> Result<Projection> {
     config.check(scene.frames())?;
     let refused =
-        [(!config.mode.is_projection(), "mode"), (config.certify, "certify"), (config.chooses_by_view(), "limited")];
+        [(!config.mode.is_projection(), "mode"), (config.certify, "certify"), (config.chooses_by_view(), "error")];
     if let Some((_, setting)) = refused.into_iter().find(|(wrong, _)| *wrong) {
         return Err(Error::setting(setting, "applies to whole pictures, not to the sums of a part"));
     }

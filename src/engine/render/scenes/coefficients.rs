@@ -155,7 +155,7 @@ impl<'a> CoefficientBatch<'a> {
         let region = config.region.unwrap_or(self.file.grid.whole());
         // Decoded samples are rounded to their type, so the bound for left-out parts would not cover their whole error.
         if let Some(allowed) = config.allowed.filter(|_| self.plan.what != SplatSource::Samples) {
-            let rule = self.rule(allowed, config.limited, &region)?;
+            let rule = self.rule(allowed, config.error, &region)?;
             self.selector.rule = rule;
         }
         let with_ranges = !config.mode.is_projection();

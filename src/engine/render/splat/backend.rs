@@ -42,7 +42,7 @@ impl SplatBackend {
             Quantity::Mean => slices * slice.of_a_smooth_mean(),
             Quantity::Emission => slices * slice.of_waves,
         };
-        let lattice = || match config.quick {
+        let lattice = || match config.fast {
             true => Lattice::quick(view, estimated),
             false => Lattice::within(error, view, stated),
         };

@@ -119,9 +119,9 @@ mod tests {
             paired: false,
             region: None,
             splat_error: 1e-3,
-            quick: false,
+            fast: false,
             allowed: None,
-            limited: Limit::Certified,
+            error: Limit::Certified,
             certify: false,
             memory: 1 << 29,
         };

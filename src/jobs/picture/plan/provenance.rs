@@ -64,7 +64,7 @@ fn with_file(
 ) -> Provenance {
     let m = file.metadata();
     let reached = m.windows.iter().map(|w| w.reached).fold(0.0, f64::max);
-    let certified = config.limited == Limit::Certified && !request.skip_damaged;
+    let certified = config.error == Limit::Certified && !request.skip_damaged;
     Provenance {
         lod: Some(file.lod()).filter(|lod| *lod > 0),
         sample_error: certified.then(|| config.allowed.unwrap_or(0.0).max(reached)),

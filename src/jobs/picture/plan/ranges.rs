@@ -105,8 +105,8 @@ fn small(config: &RenderConfig) -> RenderConfig {
 
 /// The same pictures, less exact.
 fn rough(small: &RenderConfig) -> RenderConfig {
-    let quick = matches!(small.mode, Mode::Projection);
-    RenderConfig { quick, splat_error: small.splat_error.max(SPLAT_ERROR), ..small.clone() }
+    let fast = matches!(small.mode, Mode::Projection);
+    RenderConfig { fast, splat_error: small.splat_error.max(SPLAT_ERROR), ..small.clone() }
 }
 
 /// At most `count` frames, spread over the archive.

@@ -72,12 +72,6 @@ fn opacity(text: &str) -> Result<f64, String> {
 }
 
 impl SurfaceList {
-    /// Surfaces at values, in default colours; `None` if there is no value.
-    pub(crate) fn at_values(values: &[f64]) -> Option<Self> {
-        let named = |value: &f64| Named { at: At::Value(*value), colour: None, opacity: None };
-        (!values.is_empty()).then(|| Self(values.iter().map(named).collect()))
-    }
-
     /// The surfaces, with the colours that a map has at their values unless they have their own.
     pub(crate) fn surfaces(&self, map: &TransferFunction, is_map_given: bool) -> Vec<Surface> {
         let (lo, hi) = map.range();

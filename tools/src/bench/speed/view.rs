@@ -178,9 +178,9 @@ fn by_library(scene: &mut dyn Scene, view: &View, sink: &mut dyn FnMut(usize, &[
         frames: view.frames.clone(),
         region: view.region.map(|_| region(view, scene.grid())),
         splat_error: view.splat_error,
-        quick: false,
+        fast: false,
         allowed: view.allowed,
-        limited: Limit::Expected,
+        error: Limit::Expected,
         memory: MEMORY,
         ..RenderConfig::new(scene, view.camera.view())
     };

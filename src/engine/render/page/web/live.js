@@ -11,6 +11,9 @@ const AHEAD = 0, PLOT = 1, USER = 2;
 
 class Stale extends Error {}
 
+// Numbers with nine digits: a picture of 4096 pixels shows no more.
+const short = number => Number(number.toPrecision(9)), texts = numbers => numbers.map(short).join();
+
 const pause = milliseconds => new Promise(next => setTimeout(next, milliseconds));
 
 class Live {
@@ -23,7 +26,7 @@ class Live {
     };
     this.about = this.first;
     this.sequences = [{ label: '', pictures: facts.labels.map((_, frame) => ({ view: 0, frame })) }];
-    this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: true, light: false, ...this.home() };
+    this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: 'box,axes', ...this.home() };
     this.known = {}; // automatic range and clear values of each mode, from its first answer
     this.kept = new Map(); // pictures of each look, the last one used at the end
     this.turn = Promise.resolve();
@@ -42,18 +45,30 @@ class Live {
     return room.map(side => Math.round(side * most));
   }
 
-  // The request for the pictures of some frames.
-  request(frames, isFull) {
-    const { mode, zoom, opacity, range, ...look } = this.look, full = this.fullSize();
+  // The request for the pictures of some frames: fields of a PictureRequest, as the texts of its options.
+  request(frames, isFull, chosen = {}) {
+    const { mode, view, center, zoom, map, range, opacity, slices, iso, shade, annotate, theme } = this.look, full = this.fullSize();
     const part = isFull ? 1 : Math.min(1, MOVING_PIXELS / Math.max(...full));
     const size = full.map(side => Math.max(1, Math.round(side * part)));
-    const scale = zoom * 0.95 * Math.min(...size) / (2 * this.facts.radius);
     const lod = isFull || mode === 'slice' ? 0 : Math.min(this.facts.coarsest, 1);
     const isOfErrors = mode === 'error', isComposite = mode === 'composite';
+    const colours = { map, ...this.known[this.colourKey(isFull)], ...(isComposite && range ? { range } : {}), ...chosen };
+    const look = {
+      mode: isOfErrors || mode === 'mean' ? undefined : mode, view: [view.join()], center: texts(center), size: size.join('x'),
+      scale: short(zoom * 0.95 * Math.min(...size) / (2 * this.facts.radius)), lod: lod || undefined, frames: frames?.join(':'),
+      shade: isComposite && shade, opacity: isComposite ? opacity?.map(point => point.join(':')).join() : undefined,
+      iso: iso.length ? iso.join() : undefined, slice: slices.length ? slices.map(([axis, share]) => `${axis}=${short(100 * share)}%`) : undefined,
+      annotate, theme, ...this.coloursOf(mode, colours),
+    };
+    return { look, certify: isOfErrors && isFull, packed: this.isSlow };
+  }
+
+  // The fields of a PictureRequest for colours.
+  coloursOf(mode, { map, range, log, clear }) {
+    const ofSamples = mode === 'composite' || mode === 'iso', isClear = clear && !ofSamples && mode !== 'slice';
     return {
-      ...look, mode: isOfErrors ? 'mean' : mode, size, scale, lod, frames, certify: isOfErrors && isFull, packed: this.isSlow,
-      ...(isComposite && opacity ? { opacity } : {}), range: isComposite ? range : null, ...this.known[this.colourKey(isFull)],
-      ...(isComposite && range ? { range } : {}),
+      [ofSamples ? 'transfer_function' : 'colormap']: map, range: range ? texts(range) : undefined, norm: log && !ofSamples ? 'log' : undefined,
+      clear: isClear ? clear.length === 2 ? texts(clear) : 'none' : undefined,
     };
   }
 
@@ -68,7 +83,8 @@ class Live {
   // A key for all requests that differ only in the frame.
   key(isFull) {
     const isChosen = this.look.mode === 'composite' && this.look.range;
-    return JSON.stringify({ ...this.request(null, isFull), ...(isChosen ? {} : { range: null }), clear: null, packed: null, colours: this.colourKey(isFull) });
+    const { look, certify } = this.request(null, isFull);
+    return JSON.stringify({ ...look, ...(isChosen ? {} : { range: null }), clear: null, certify, colours: this.colourKey(isFull) });
   }
 
   // A picture: complete if nothing moves, else a small one.
@@ -251,6 +267,6 @@ class Live {
   async made(where, file) {
     const frames = file.endsWith('.png') ? [this.index, this.index + 1] : [0, this.sequences[0].pictures.length];
     const certify = where === 'command' && this.look.mode === 'error';
-    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, true), ...this.colours(), certify });
+    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, true, this.colours()), certify });
   }
 }

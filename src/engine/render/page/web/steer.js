@@ -200,7 +200,7 @@ class Steering {
     const changes = { mode, iso: mode === 'iso' ? [await this.iso()] : [], slices: mode === 'slice' ? slices : [], shade: element('shade').checked };
     const isComposite = mode === 'composite', { chosen } = this.player, { maps } = this.live.facts;
     const map = isComposite && chosen.map in maps ? chosen.map : undefined, range = isComposite ? chosen['of composite']?.range ?? null : null;
-    this.live.change({ ...changes, map, range, annotate: element('around').checked, light: element('white').checked }, isMoving);
+    this.live.change({ ...changes, map, range, annotate: element('around').checked ? 'box,axes' : undefined, theme: element('white').checked ? 'light' : undefined }, isMoving);
   }
 
   // The value of the isosurface.
