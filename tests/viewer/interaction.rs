@@ -35,10 +35,14 @@ fn the_camera_follows_the_pointer() {
         (0..2).all(|n| ((view[n].as_f64().unwrap() - turned[n] + 180.0).rem_euclid(360.0) - 180.0).abs() < 0.1),
         "{view} {turned:?}"
     );
-    let first: Value = serde_json::from_str(browser.js("asked[0][1]").as_str().unwrap()).unwrap();
-    assert!(first["size"][0].as_u64().unwrap() <= 288, "small while it moves: {first}");
+    let width = |browser: &mut Browser, asked: &str| {
+        let size = browser.js(&format!("JSON.parse({asked}[1]).look.size"));
+        size.as_str().unwrap().split_once('x').unwrap().0.parse::<u32>().unwrap()
+    };
+    let first = width(&mut browser, "asked[0]");
+    assert!(first <= 288, "small while it moves: {first}");
     browser.wait(FULL);
-    let most = browser.js("JSON.parse(asked.at(-1)[1]).size[0]").as_u64().unwrap();
+    let most = width(&mut browser, "asked.at(-1)");
     assert!(most > 288, "full at rest: {most}");
 
     let before = look(&mut browser);

@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Peers of wavesplat's renderer: how long VTK takes for all frames of a view, additive, from memory.
 
-Nothing else in this project needs Python; `wavesplat-tools bench speed --peers python3` runs this script.
-
     python3 views.py data/plate.npy --spacing 2.3 --size 512 --threads 1
 
 prints a line of JSON for each renderer:

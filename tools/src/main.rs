@@ -9,7 +9,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat_cli::InputArgs;
 use wavesplat_cli::error_text;
 use wavesplat_tools::bench::size::{self, Peers, Subject};
-use wavesplat_tools::bench::{self, layers, plan::Sweep, sanity, speed};
+use wavesplat_tools::bench::{self, plan::Sweep, sanity, speed};
 use wavesplat_tools::demo;
 use wavesplat_tools::diff;
 use wavesplat_tools::eddy::Plate;
@@ -32,7 +32,6 @@ Examples:
   wavesplat-tools bench --quick -o quick
   wavesplat-tools bench size --peers python3 -o sizes
   wavesplat-tools bench size mine.npy --tolerances 1e-2,1e-3
-  wavesplat-tools bench layers mine.npy -o layers
   wavesplat-tools bench speed -o speed
   wavesplat-tools bench speed --against other/target/release -o speed
 
@@ -148,20 +147,17 @@ struct BenchArgs {
 enum OtherBench {
     /// Print file sizes under a hard bound, conversion and decoding times on one core, and the same of other coders
     Size(SizeArgs),
-    /// Print how much of a file pictures with looser tolerances leave unread, and their certified, expected and true
-    /// errors
-    Layers(LayersArgs),
-    /// Print how much faster views are than with the conventional method, beside the targets
+    /// Print the seconds of the programs, beside another build's
     Speed(SpeedArgs),
 }
 
-/// Other coders and renderers.
+/// Other coders.
 #[derive(Args)]
 struct PeerArgs {
     /// Also measure other programs, run by this Python. It needs the packages of tools/peers/requirements.txt
     #[arg(long, value_name = "PYTHON")]
     peers: Option<PathBuf>,
-    /// Script that Python runs; views.py must be in the same folder [default: tools/peers/peers.py of the sources]
+    /// Script that Python runs [default: tools/peers/peers.py of the sources]
     #[arg(long, value_name = "FILE", requires = "peers")]
     script: Option<PathBuf>,
 }
@@ -182,37 +178,28 @@ struct SpeedArgs {
     /// inputs]
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Option<Vec<Kind>>,
-    /// Sizes of the synthetic archives, separated by commas [default: 128x128x128x32,256x256x256x32,128x128x128x64]
-    #[arg(long, value_name = "NXxNYxNZxNT", value_delimiter = ',', value_parser = parse_dims)]
-    dims: Option<Vec<[usize; 4]>>,
-    /// Pixels from one voxel to the next, separated by commas
-    #[arg(long, value_name = "PX", value_delimiter = ',', default_value = "2.3,1", value_parser = parse_tolerance)]
-    spacings: Vec<f64>,
-    /// Pixels a side of the pictures [default: 512]
-    #[arg(long, value_name = "N")]
-    size: Option<usize>,
-    /// Tolerances as shares of the value range, separated by commas; the targets apply to the first
-    #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-2,1e-3", value_parser = parse_tolerance)]
-    tolerances: Vec<f64>,
-    /// Numbers of threads, separated by commas
-    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "1,2")]
-    threads: Vec<usize>,
-    /// Number of rounds through all measurements; the shortest time counts [default: 3]
-    #[arg(long, value_name = "N")]
-    repeats: Option<usize>,
-    /// Use small archives and pictures, to check in seconds that everything works
-    #[arg(long)]
-    small: bool,
-    /// Instead, compare this build's wavesplat-render with the one in this folder: both draw the same pictures, in
-    /// turns
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["large", "peers", "spacings", "threads"])]
+    /// Size of the synthetic archives
+    #[arg(long, value_name = "NXxNYxNZxNT", default_value = "128x128x128x32", value_parser = parse_dims)]
+    dims: [usize; 4],
+    /// Pixels a side of the pictures
+    #[arg(long, value_name = "N", default_value_t = 512)]
+    size: usize,
+    /// Tolerance of the files, as a share of the value range
+    #[arg(long, value_name = "E", default_value = "1e-2", value_parser = parse_tolerance)]
+    tolerance: f64,
+    /// Threads of the programs
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    threads: usize,
+    /// Number of rounds through all commands; the shortest time counts
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    repeats: usize,
+    /// Folder of the programs to measure [default: that of this program]
+    #[arg(long, value_name = "DIR")]
+    programs: Option<PathBuf>,
+    /// Also measure the programs in this folder, in turns
+    #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// Also measure the memory of converting archives of 4 GiB and 20 GiB, which are written to the folder of results
-    #[arg(long)]
-    large: bool,
-    #[command(flatten)]
-    peers: PeerArgs,
-    /// The folder of speed.json and speed.md
+    /// The folder of speed.md
     #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
     output: PathBuf,
     /// The date to write into the results [default: today]
@@ -222,40 +209,22 @@ struct SpeedArgs {
 
 impl SpeedArgs {
     fn config(&self) -> Result<speed::Config> {
-        let usual = if self.inputs.is_empty() { speed::KINDS.to_vec() } else { Vec::new() };
-        let sizes = if self.small { &speed::SMALL } else { &speed::USUAL };
+        let usual = if self.inputs.is_empty() { vec![Kind::Smooth, Kind::Moving, Kind::Sparse] } else { Vec::new() };
+        let here = this_program()?.parent().map(Into::into).unwrap_or_default();
         Ok(speed::Config {
             inputs: self.inputs.clone(),
             kinds: self.kinds.clone().unwrap_or(usual),
-            dims: self.dims.clone().unwrap_or(sizes.dims.to_vec()),
-            spacings: self.spacings.clone(),
-            size: self.size.unwrap_or(sizes.size),
-            tolerances: self.tolerances.clone(),
-            threads: self.threads.clone(),
-            repeats: self.repeats.unwrap_or(sizes.repeats),
-            large: if self.large { sizes.large.to_vec() } else { Vec::new() },
-            peers: self.peers.given(),
+            dims: self.dims,
+            tolerance: self.tolerance,
+            size: self.size,
+            threads: self.threads,
+            repeats: self.repeats,
+            programs: self.programs.clone().unwrap_or(here),
+            against: self.against.clone(),
             output: self.output.clone(),
-            program: this_program()?,
             date: self.date.clone(),
         })
     }
-}
-
-#[derive(Args)]
-struct LayersArgs {
-    /// Archives (t, z, y, x), each one .npy
-    #[arg(value_name = "INPUT.npy", required = true)]
-    inputs: Vec<PathBuf>,
-    /// The folder of layers.json and layers.md
-    #[arg(short, long, value_name = "DIR", default_value = "bench-output")]
-    output: PathBuf,
-    /// Tolerances of pictures as shares of the value range, separated by commas
-    #[arg(long, value_name = "E", value_delimiter = ',', default_value = "1e-3,3e-3,1e-2,3e-2,1e-1,3e-1", value_parser = parse_tolerance)]
-    tolerances: Vec<f64>,
-    /// The date to write into the results [default: today]
-    #[arg(long, value_name = "YYYY-MM-DD")]
-    date: Option<String>,
 }
 
 #[derive(Args)]
@@ -377,26 +346,8 @@ fn bench_size(args: &SizeArgs) -> Result<()> {
     Err(Error::BoundMissed { path: args.output.clone(), what: format!("THE BOUND IS MISSED\n{}", wrong.join("\n")) })
 }
 
-fn bench_layers(args: &LayersArgs) -> Result<()> {
-    let LayersArgs { inputs, output, tolerances, date } = args;
-    let (inputs, tolerances, output) = (inputs.clone(), tolerances.clone(), output.clone());
-    let config = layers::Config { inputs, tolerances, output, program: this_program()?, date: date.clone() };
-    let (results, table) = layers::run(&config, &mut say)?;
-    wavesplat_cli::print(&table)?;
-    let wrong = layers::complaints(&results);
-    if wrong.is_empty() {
-        return Ok(());
-    }
-    Err(Error::BoundMissed { path: args.output.clone(), what: wrong.join("\n") })
-}
-
 fn bench_speed(args: &SpeedArgs) -> Result<()> {
-    let config = args.config()?;
-    let tables = match &args.against {
-        Some(folder) => speed::against::run(&config, folder, &mut say)?,
-        None => speed::run(&config, &mut say)?.1,
-    };
-    wavesplat_cli::print(&tables)
+    wavesplat_cli::print(&speed::run(&args.config()?, &mut say)?)
 }
 
 fn bench(args: &BenchArgs) -> Result<()> {
@@ -425,7 +376,6 @@ fn main() -> ExitCode {
         Command::Diff(args) => diff::run(&args),
         Command::Bench(args) => match &args.other {
             Some(OtherBench::Size(args)) => bench_size(args),
-            Some(OtherBench::Layers(args)) => bench_layers(args),
             Some(OtherBench::Speed(args)) => bench_speed(args),
             None => bench(&args),
         },

@@ -4,14 +4,17 @@
 //! that a voxel costs a few multiplications. A frame depends only on the settings and its number. Coordinates and time
 //! run over 0..1, so that more voxels or frames refine the same scene.
 
-use crate::output::Shape;
+use crate::output::{Format, Shape, Target};
 use crate::random::Random;
+use clap::ValueEnum;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
-use wavesplat::base::sample;
+use std::path::{Path, PathBuf};
+use wavesplat::base::error::Result;
+use wavesplat::base::sample::{self, SampleType};
 
 /// What the frames show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ValueEnum)]
 pub enum Kind {
     /// Blobs that diffuse: every voxel changes slowly (values 0 to 1)
     Smooth,
@@ -26,6 +29,11 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// The name on the command line.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or(String::new(), |value| value.get_name().into())
+    }
+
     /// The lowest value that can occur; the highest is 1.
     pub fn lowest(self) -> f64 {
         if self == Self::Oscillating { -1.0 } else { 0.0 }
@@ -44,6 +52,18 @@ pub struct Synth {
 }
 
 impl Synth {
+    /// An archive of `f32` with so many voxels along x, y and z, and frames.
+    pub fn f32(kind: Kind, [nx, ny, nz, frames]: [usize; 4]) -> Self {
+        Self { kind, shape: Shape { dims: [nx, ny, nz], frames, ty: SampleType::F32 }, seed: 0 }
+    }
+
+    /// Writes `KIND.npy` into a folder, and returns its path.
+    pub fn write_npy(&self, folder: &Path) -> Result<PathBuf> {
+        let path = folder.join(format!("{}.npy", self.kind.name()));
+        Target::File(path.clone(), Format::Npy).write(&self.shape, |frame, bytes| self.fill(frame, bytes))?;
+        Ok(path)
+    }
+
     /// Fills `out` with frame `frame`: little-endian samples, x fastest, then y, z.
     ///
     /// Floating-point samples hold the values as they are. Unsigned integers use their whole range for the kind's

@@ -6,8 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The folders of the benchmark below `src/`, with the path that names their modules.
-const FOLDERS: [(&str, &str); 3] =
-    [("bench", "crate::bench::"), ("bench/size", "crate::bench::size::"), ("bench/speed", "crate::bench::speed::")];
+const FOLDERS: [(&str, &str); 2] = [("bench", "crate::bench::"), ("bench/size", "crate::bench::size::")];
 
 fn src(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(path)

@@ -1,96 +1,67 @@
-//! The benchmark of speed in small, as a program: every row is there, measured or with the reason why not. No time is
-//! judged, and the peers are played by a shell, so that no Python is needed.
+//! The benchmark of speed in small, as a program: every command has a row. No time is judged, and the programs are played
+//! by a shell.
 #![allow(clippy::unwrap_used)]
+#![cfg(unix)]
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Output};
-use wavesplat_tools::bench::speed::{Results, Row};
 
 fn speed(output: &Path, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_wavesplat-tools"));
-    command.args(["bench", "speed", "--small", "-o"]).arg(output).args(args).output().unwrap()
+    command.args(["bench", "speed", "--dims", "6x5x4x8", "--repeats", "2", "-o"]).arg(output).args(args);
+    command.output().unwrap()
 }
 
-fn results(run: &Output, output: &Path) -> Results {
+/// Two programs that note their words, and do what `body` says.
+fn programs(folder: &Path, body: &str) {
+    fs::create_dir_all(folder).unwrap();
+    for name in ["wavesplat", "wavesplat-render"] {
+        let path = folder.join(name);
+        fs::write(&path, format!("#!/bin/sh\necho \"{name} $*\" >> {}\n{body}\n", folder.join("log").display()))
+            .unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+}
+
+#[test]
+fn every_command_has_a_row_for_both_builds() {
+    let folder = tempfile::tempdir().unwrap();
+    let [own, other] = ["own", "other"].map(|name| folder.path().join(name));
+    programs(&own, "");
+    programs(&other, "");
+    let (own_text, other_text) = (own.to_str().unwrap(), other.to_str().unwrap());
+    let run = speed(folder.path(), &["--programs", own_text, "--against", other_text, "--kinds", "smooth,noise"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    assert_eq!(fs::read(output.join("speed.md")).unwrap(), run.stdout);
-    assert!(!output.join("speed-work").exists());
-    serde_json::from_slice(&fs::read(output.join("speed.json")).unwrap()).unwrap()
-}
-
-/// What was measured of a row, or why nothing was.
-fn said(row: &Row) -> bool {
-    row.value.map_or(!row.note.is_empty(), |v| v >= 0.0 && v.is_finite())
-}
-
-#[test]
-fn every_row_has_a_value_or_a_reason() {
-    let folder = tempfile::tempdir().unwrap();
-    let results = results(&speed(folder.path(), &["--large"]), folder.path());
-    assert_eq!(results.archives.len(), 3);
-    assert!(results.rows.iter().all(said), "{:?}", results.rows.iter().find(|r| !said(r)));
-    let of = |words: &str| results.rows.iter().filter(|r| r.target.contains(words)).collect::<Vec<_>>();
-    let (files, spacings, threads) = (4, 2, 2);
-    for words in ["than the textbook form", "conventional's", "nothing cached", "SZ3", "on the CPU", "Mesa", "zstd"] {
-        let views = of(words).into_iter().filter(|r| r.data != "the paper's").count();
-        assert_eq!(views, 3 * files * spacings * threads, "{words}");
-    }
-    for words in ["than the textbook form", "plain read", "largest image error", "rms image error"] {
-        assert!(of(words).iter().any(|r| r.value.is_some()), "{words}");
-    }
-    let errors = of("largest image error").into_iter().filter(|r| r.wanted.is_some()).collect::<Vec<_>>();
-    assert!(errors.len() == 3 * spacings && errors.iter().all(|r| r.value.unwrap() < 1e-2), "{errors:?}");
-    assert!(of("SZ3").iter().all(|r| r.value.is_none() && r.met.is_none() && r.note.contains("--peers")));
-    #[cfg(target_os = "linux")]
-    assert_eq!(of("peak heap").iter().filter(|r| r.value.is_some()).count(), 3);
-    for archive in &results.archives {
-        let frames = &archive.measured["frames 1"];
-        assert!(frames.bytes > 0 && frames.bytes <= archive.measured["view auto 1e-2 2.3 px x1"].bytes);
-        assert_eq!(archive.measured["true errors"].errors.len(), 1 + 5 + 2);
-    }
-}
-
-/// Answers for SZ3, and for one of two renderers.
-#[cfg(unix)]
-const PEERS: &str = r#"
-echo '{"tolerance": 1e-2, "peer": "sz3-3d", "bytes": 1, "bound": 0.1, "largest_error": 0.05, "encode_seconds": 9, "decode_seconds": 1e9}'
-"#;
-#[cfg(unix)]
-const VIEWS: &str = r#"
-echo '{"renderer": "vtk-cpu", "seconds": [1e9, 2e9]}'
-echo '{"renderer": "vtk-mesa", "seconds": null, "why": "VTK is not installed"}'
-"#;
-
-#[cfg(unix)]
-#[test]
-fn given_archives_are_measured_beside_other_programs() {
-    let folder = tempfile::tempdir().unwrap();
-    let input = folder.path().join("mine.npy");
-    let made = Command::new(env!("CARGO_BIN_EXE_wavesplat-tools"))
-        .args(["synth", "smooth", "--dims", "9x8x7x20", "--dtype", "i16", "-o"])
-        .arg(&input)
-        .status();
-    assert!(made.unwrap().success());
-    let script = folder.path().join("peers.py");
-    fs::write(&script, PEERS).unwrap();
-    fs::write(folder.path().join("views.py"), VIEWS).unwrap();
-    let few = ["--tolerances", "1e-2", "--threads", "1", "--spacings", "2", "--peers", "sh", "--script"];
-    let args = [&few[..], &[script.to_str().unwrap(), input.to_str().unwrap()]].concat();
-    let results = results(&speed(folder.path(), &args), folder.path());
-    assert_eq!(results.archives.len(), 1, "no others are made");
-    let row = |words: &str| results.rows.iter().find(|r| r.target.contains(words) && r.data == "mine").unwrap();
-    assert_eq!((row("SZ3").met, row("on the CPU").met, row("Mesa").met), (Some(true), Some(true), None));
-    assert!(row("Mesa").note.contains("not installed"));
-    assert!(row("than the textbook form").note.contains("f32"), "the archive is of integers");
-    assert!(input.exists());
+    let text = fs::read_to_string(folder.path().join("speed.md")).unwrap();
+    assert_eq!(text.as_bytes(), run.stdout);
+    let rows: Vec<Vec<&str>> = text
+        .lines()
+        .filter(|line| line.starts_with("| smooth") || line.starts_with("| noise"))
+        .map(|line| line.split(" | ").collect())
+        .collect();
+    assert_eq!(rows.len(), 2 * 18);
+    assert!(
+        rows.iter().all(|row| row[2..].iter().all(|cell| cell.trim_end_matches(" |").parse::<f64>().unwrap() > 0.0))
+    );
+    let log = fs::read_to_string(own.join("log")).unwrap();
+    assert_eq!(log.lines().count(), 2 * (1 + 2 * 18), "the conversion of the file, and two rounds");
+    assert!(log.contains("wavesplat-render") && log.contains("--range 0") && !log.contains("FILE"), "{log}");
+    assert!(!folder.path().join("speed-work").exists());
 }
 
 #[test]
 fn what_cannot_be_measured_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let code = |args: &[&str]| speed(folder.path(), args).status.code();
-    assert_eq!(code(&["--threads", "0"]), Some(2));
-    assert_eq!(code(&["--script", "x.py"]), Some(2), "goes with --peers");
-    assert_eq!(code(&["--repeats", "0"]), Some(2));
+    programs(folder.path(), "exit 3");
+    let programs = folder.path().to_str().unwrap();
+    let failed = |args: &[&str], code, words: &str| {
+        let run = speed(folder.path(), args);
+        let text = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.code() == Some(code) && text.contains(words), "{args:?}: {text}");
+    };
+    failed(&["--threads", "0"], 2, "--threads");
+    failed(&["--programs", programs], 3, "convert");
+    failed(&["--programs", "nowhere"], 1, "nowhere");
 }

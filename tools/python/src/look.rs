@@ -41,7 +41,7 @@ pub(crate) fn render_from(
 
 /// Bytes of a size such as 512MiB.
 pub(crate) fn bytes(memory: &str) -> wavesplat::Result<usize> {
-    memory.parse().map(|size: Size| size.0).map_err(|what| Error::Usage(format!("--memory: {what}")))
+    memory.parse().map(|size: Size| size.0).map_err(|what| Error::setting("memory", what))
 }
 
 /// A viewer that answers the browser until it is closed.

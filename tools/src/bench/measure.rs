@@ -2,7 +2,7 @@
 
 use super::camera::{CameraSettings, compared_frames};
 use super::json::bad_json;
-use super::plan::{Contender, Group, kind_name};
+use super::plan::{Contender, Group};
 use super::point::{Conversion, Point, Rendering, Spread};
 use super::process::{Outcome, in_process};
 use super::reference::ReferencePixels;
@@ -166,7 +166,7 @@ impl<'a> Bench<'a> {
             key,
             group: group.name(),
             sweep: if group.splat.is_some() { "splat" } else { "tolerance" }.into(),
-            kind: kind_name(group.kind),
+            kind: group.kind.name(),
             tolerance: group.tolerance,
             method: contender.method().into(),
             bound: contender.bound().map(Into::into),

@@ -18,8 +18,7 @@
 //! report     results.json and results.md
 //! plot       the figures
 //! size       another benchmark: sizes under a hard bound, and times, compared with other coders
-//! layers     another: the bytes that a looser tolerance of a picture skips, and the errors
-//! speed      another: views from files compared with the conventional method, and the targets
+//! speed      another: seconds of the programs, beside another build's
 //! step       the command `bench-step`
 //! ```
 //!
@@ -44,7 +43,6 @@ mod measure;
 mod report;
 mod plot;
 pub mod size;
-pub mod layers;
 pub mod speed;
 mod step;
 

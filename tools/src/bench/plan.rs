@@ -204,7 +204,7 @@ impl Group {
 
     /// The group's name: sweep, kind, tolerance and, in the second sweep, the splat method.
     pub fn name(&self) -> String {
-        let kind = kind_name(self.kind);
+        let kind = self.kind.name();
         match self.splat {
             Some(splat) => format!("splat/{kind}/{:e}/{splat}", self.tolerance),
             None => format!("tolerance/{kind}/{:e}", self.tolerance),
@@ -222,14 +222,9 @@ impl Group {
 
 impl fmt::Display for Group {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, tolerance {:e}", kind_name(self.kind), self.tolerance)?;
+        write!(f, "{}, tolerance {:e}", self.kind.name(), self.tolerance)?;
         self.splat.map_or(Ok(()), |splat| write!(f, ", {splat}"))
     }
-}
-
-/// The name of a kind on the command line.
-pub fn kind_name(kind: Kind) -> String {
-    kind.to_possible_value().map_or(String::new(), |v| v.get_name().into())
 }
 
 #[cfg(test)]

@@ -1,9 +1,7 @@
 //! The command `bench-step`: runs one measurement by name, for [`super::process::in_process`].
 
-use super::layers;
 use super::process::{ProcessTask, answer};
 use super::size::own;
-use super::speed::work;
 use super::stages::{Convert, Render};
 use wavesplat::base::error::{Error, Result};
 
@@ -16,8 +14,6 @@ pub fn run_step(name: &str, task: &str) -> Result<String> {
         Convert::NAME => answer::<Convert>(task),
         Render::NAME => answer::<Render>(task),
         own::Task::NAME => answer::<own::Task>(task),
-        layers::Task::NAME => answer::<layers::Task>(task),
-        work::Task::NAME => answer::<work::Task>(task),
         _ => Err(Error::usage(format!("bench-step: there is no measurement '{name}'"))),
     }
 }

@@ -64,8 +64,9 @@ impl Subject {
     /// Writes the archive into a folder.
     pub(in crate::bench) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
         let path = folder.join(format!("{}.npy", self.name()));
+        let dims = if small { [16, 12, 10, 8] } else { [64, 64, 64, 32] };
         match (self.synth(), peers) {
-            (Some(kind), _) => synthetic(kind, small, &path)?,
+            (Some(kind), _) => drop(Synth::f32(kind, dims).write_npy(folder)?),
             (None, _) if self == Self::Demo => demo(small, &path)?,
             (None, Some(peers)) => peers.generate(&self.name(), folder, small)?,
             (None, None) => return Err(Error::usage(format!("--kinds: {} needs --peers", self.name()))),
@@ -84,12 +85,6 @@ fn demo(small: bool, path: &Path) -> Result<()> {
         let values = solution.next().into_iter().flatten();
         bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(b, v)| *b = v.to_le_bytes());
     })
-}
-
-fn synthetic(kind: Kind, small: bool, path: &Path) -> Result<()> {
-    let (dims, frames) = if small { ([16, 12, 10], 8) } else { ([64; 3], 32) };
-    let synth = Synth { kind, shape: Shape { dims, frames, ty: SampleType::F32 }, seed: 0 };
-    Target::File(path.into(), Format::Npy).write(&synth.shape, |frame, bytes| synth.fill(frame, bytes))
 }
 
 /// An archive and its size.

@@ -46,12 +46,6 @@ impl Peers {
         lines.lines().map(|line| self.line(line)?.row(task)).collect()
     }
 
-    /// The output of the script `views.py` for an archive: a line for each renderer.
-    pub(in crate::bench) fn views(&self, archive: &Path, args: &[String]) -> Result<Vec<u8>> {
-        let (script, fixed) = (self.script.with_file_name("views.py"), [archive.as_os_str()]);
-        self.run(&script, fixed.into_iter().chain(args.iter().map(OsStr::new)))
-    }
-
     fn line(&self, text: &str) -> Result<Line> {
         serde_json::from_str(text).map_err(|e| crate::bench::json::bad_json(&self.script, &e))
     }
