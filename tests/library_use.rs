@@ -13,7 +13,7 @@ use wavesplat::render::{CoefficientScene, Mode, RenderConfig, check, render_png}
 use wavesplat::source::ArraySource;
 use wavesplat::view::camera::View;
 use wavesplat::{Error, Grid, Region, SampleType};
-use wavesplat_format::{BlockId, Storage};
+use wavesplat_format::Storage;
 
 const DIMS: [usize; 3] = [20, 14, 9];
 const FRAMES: usize = 12;
@@ -185,25 +185,6 @@ fn pictures_of_a_remote_file_are_the_same() {
         assert!(near.iter().zip(&far).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert!(remote.asked().len() <= 2, "leaves, then blocks");
     }
-}
-
-#[test]
-fn whole_blocks_are_read_by_number() {
-    let mut source = ArraySource::from_f32(DIMS, &samples()).unwrap();
-    let stored = stored(&mut source, &config());
-    let remote = Remote::of(stored.bytes());
-    let file = CoefficientFile::from_storage("far", remote.clone()).unwrap();
-    let ids = [(0, 3), (0, 7), (1, 0), (1, 3), (0, 1)].map(|(window, block)| BlockId { window, block, channel: 0 });
-    for file in [&file, &stored.open()] {
-        for (id, bytes) in ids.iter().zip(file.read_blocks(&ids).unwrap()) {
-            let region = file.blocks.region(id.block as usize);
-            let expected = read_region(file, file.window_range(id.window), &region).unwrap();
-            let found = bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
-            assert!(found.zip(expected).all(|(a, b)| a == b || b.is_nan() && a == MISSING as f32), "{id}");
-        }
-    }
-    assert!(file.read_blocks(&[BlockId { block: file.blocks.len() as u32, ..ids[0] }]).is_err());
-    assert!(file.read_blocks(&[BlockId { window: 9, ..ids[0] }]).is_err());
 }
 
 #[test]

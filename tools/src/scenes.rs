@@ -2,13 +2,10 @@
 
 use std::path::Path;
 use wavesplat::base::error::Result;
-use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::convert::{ConvertConfig, ConvertReport, convert};
-use wavesplat::render::{Mode, Quantity, RenderConfig, RenderReport, Scene, render};
+use wavesplat::render::{RenderConfig, RenderReport, Scene, render};
 use wavesplat::source::FrameSource;
-use wavesplat::view::camera::View;
-use wavesplat::view::footprint::Kernel;
 use wavesplat_core::base::output::Output;
 
 /// Bytes that a conversion or a rendering may allocate.
@@ -20,31 +17,6 @@ pub(crate) fn converted(source: &mut dyn FrameSource, config: &ConvertConfig, pa
     let report = convert(source, config, path, &mut out, &Silent)?;
     out.commit()?;
     Ok(report)
-}
-
-/// Projections of some frames: means, attenuated by `tau` per world unit of depth.
-pub(crate) fn projection(
-    grid: &Grid,
-    view: View,
-    tau: f64,
-    frames: Vec<usize>,
-    splat_error: f64,
-) -> Result<RenderConfig> {
-    Ok(RenderConfig {
-        mode: Mode::Projection,
-        views: vec![view],
-        kernel: Kernel::new(None, tau, grid)?,
-        quantity: Quantity::Mean,
-        frames,
-        paired: false,
-        region: None,
-        splat_error,
-        fast: false,
-        allowed: None,
-        error: Default::default(),
-        certify: false,
-        memory: MEMORY,
-    })
 }
 
 /// All frames, one after another.

@@ -168,7 +168,8 @@ pub struct Cli {
 impl Cli {
     /// The request that the options make.
     pub(super) fn request(&self) -> PictureRequest {
-        let request = PictureRequest {
+        let Self { motion, colour, around, samples, slices, series, partial, .. } = self;
+        PictureRequest {
             output: self.output.clone(),
             force: self.force,
             view: self.view.clone(),
@@ -195,10 +196,34 @@ impl Cli {
             sidecar: self.sidecar.clone(),
             missing_value: self.missing_value,
             skip_damaged: self.skip_damaged,
-            ..PictureRequest::default()
-        };
-        let request = self.motion.applied_to(self.colour.applied_to(self.around.applied_to(request)));
-        self.samples.applied_to(self.slices.applied_to(self.series.applied_to(self.partial.applied_to(request))))
+            over_time: motion.over_time,
+            key_frames: motion.key_frames.clone(),
+            fps: motion.fps,
+            speed: motion.speed,
+            colormap: colour.colormap.clone(),
+            range: colour.range,
+            norm: colour.norm,
+            clear: colour.clear,
+            background: colour.background,
+            annotate: around.annotate,
+            title: around.title.clone(),
+            bar_title: around.bar_title.clone(),
+            theme: around.theme,
+            mode: samples.mode,
+            transfer_function: samples.transfer_function.clone(),
+            opacity: samples.opacity.clone(),
+            opacity_unit: samples.opacity_unit,
+            iso: samples.iso.clone(),
+            shade: samples.shade,
+            light: samples.light,
+            slices: samples.slices,
+            slice: slices.slice.clone(),
+            probe: series.probe.clone(),
+            probe_region: series.probe_region.clone(),
+            partial: partial.partial,
+            sum: partial.sum,
+            certify: false,
+        }
     }
 
     /// What pictures are made of.

@@ -1,5 +1,5 @@
 //! Groups of options: the camera over time, colours, what is drawn around, samples along a ray, slices, time series and
-//! partial sums. Each fills its fields of a request.
+//! partial sums.
 
 use crate::choice::choice;
 use clap::Args;
@@ -8,7 +8,7 @@ use wavesplat_core::base::values::{Pair, RegionSpec};
 use wavesplat_core::colour::{Norm, Opacities};
 use wavesplat_engine::render::annotate::Parts;
 use wavesplat_jobs::picture::values::{ClearSpec, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme};
-use wavesplat_jobs::picture::{PictureRequest, check_fps, check_speed};
+use wavesplat_jobs::picture::{check_fps, check_speed};
 
 /// Options for the camera over time, and for the speed of movies.
 #[derive(Debug, Args)]
@@ -27,19 +27,6 @@ pub(super) struct MotionArgs {
     /// Time of the data per second of a movie, in the unit of the data's times; sets --fps
     #[arg(long, value_name = "TIME", value_parser = parse_speed, help_heading = "Output")]
     pub(super) speed: Option<f64>,
-}
-
-impl MotionArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest {
-            over_time: self.over_time,
-            key_frames: self.key_frames.clone(),
-            fps: self.fps,
-            speed: self.speed,
-            ..request
-        }
-    }
 }
 
 /// Options for colours.
@@ -65,20 +52,6 @@ pub(super) struct ColourArgs {
     pub(super) background: Option<HexColour>,
 }
 
-impl ColourArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest {
-            colormap: self.colormap.clone(),
-            range: self.range,
-            norm: self.norm,
-            clear: self.clear,
-            background: self.background,
-            ..request
-        }
-    }
-}
-
 /// Options for what is drawn around the volume.
 #[derive(Debug, Args)]
 pub(super) struct AnnotationArgs {
@@ -102,19 +75,6 @@ pub(super) struct AnnotationArgs {
     /// Colours of background and letters
     #[arg(long, value_parser = choice::<Theme>(), default_value = "dark", help_heading = "Colour")]
     pub(super) theme: Theme,
-}
-
-impl AnnotationArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest {
-            annotate: self.annotate,
-            title: self.title.clone(),
-            bar_title: self.bar_title.clone(),
-            theme: self.theme,
-            ..request
-        }
-    }
 }
 
 /// Options for the samples along a ray.
@@ -152,23 +112,6 @@ pub(super) struct SampleArgs {
     pub(super) slices: Option<usize>,
 }
 
-impl SampleArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest {
-            mode: self.mode,
-            transfer_function: self.transfer_function.clone(),
-            opacity: self.opacity.clone(),
-            opacity_unit: self.opacity_unit,
-            iso: self.iso.clone(),
-            shade: self.shade,
-            light: self.light,
-            slices: self.slices,
-            ..request
-        }
-    }
-}
-
 /// Options for slices.
 #[derive(Debug, Args)]
 pub(super) struct SliceArgs {
@@ -178,13 +121,6 @@ pub(super) struct SliceArgs {
     /// coordinate. A single slice is seen face-on unless --view is given
     #[arg(long, value_name = "AXIS=PLACE", value_delimiter = ',', allow_hyphen_values = true, help_heading = "View")]
     pub(super) slice: Vec<SliceSpec>,
-}
-
-impl SliceArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest { slice: self.slice.clone(), ..request }
-    }
 }
 
 /// Options for time series.
@@ -201,13 +137,6 @@ pub(super) struct SeriesArgs {
     pub(super) probe_region: Vec<RegionSpec>,
 }
 
-impl SeriesArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest { probe: self.probe.clone(), probe_region: self.probe_region.clone(), ..request }
-    }
-}
-
 /// Options for pictures in parts.
 #[derive(Debug, Args)]
 pub(super) struct PartialArgs {
@@ -219,13 +148,6 @@ pub(super) struct PartialArgs {
     /// Give --annotate and --title to the parts too, since they move the volume aside
     #[arg(long, help_heading = "Parts")]
     pub(super) sum: bool,
-}
-
-impl PartialArgs {
-    /// The request with these fields.
-    pub(super) fn applied_to(&self, request: PictureRequest) -> PictureRequest {
-        PictureRequest { partial: self.partial, sum: self.sum, ..request }
-    }
 }
 
 fn parse_fps(text: &str) -> Result<f64, String> {

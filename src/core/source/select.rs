@@ -59,52 +59,31 @@ impl FrameSource for Selected {
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
         let Selection { first: start, step, region, .. } = self.selection;
         let window = self.source.window_of(start + first * step, count, step)?;
-        Ok(Box::new(SelectedWindow { window, region }))
-    }
-}
-
-struct SelectedWindow {
-    window: Box<dyn FrameWindow>,
-    region: Region,
-}
-
-impl FrameWindow for SelectedWindow {
-    fn frames(&self) -> usize {
-        self.window.frames()
-    }
-
-    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        self.window.read_box(frame, &region.moved_by(self.region.start), out)
-    }
-
-    fn name(&self, frame: usize) -> String {
-        self.window.name(frame)
-    }
-
-    fn check_unchanged(&self) -> Result<()> {
-        self.window.check_unchanged()
+        Ok(Box::new(NarrowedWindow { frames: window.frames(), window, start: region.start, step: 1 }))
     }
 }
 
 /// Every `step`-th frame of a window from its first, at most `count` of them.
 pub(crate) fn stepped(window: Box<dyn FrameWindow>, count: usize, step: usize) -> Box<dyn FrameWindow> {
     let frames = window.frames().div_ceil(step).min(count);
-    Box::new(SteppedWindow { window, frames, step })
+    Box::new(NarrowedWindow { window, start: [0; 3], frames, step })
 }
 
-struct SteppedWindow {
+/// Some frames of a window, and voxels from some place.
+struct NarrowedWindow {
     window: Box<dyn FrameWindow>,
+    start: [usize; 3],
     frames: usize,
     step: usize,
 }
 
-impl FrameWindow for SteppedWindow {
+impl FrameWindow for NarrowedWindow {
     fn frames(&self) -> usize {
         self.frames
     }
 
     fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        self.window.read_box(frame * self.step, region, out)
+        self.window.read_box(frame * self.step, &region.moved_by(self.start), out)
     }
 
     fn name(&self, frame: usize) -> String {

@@ -51,21 +51,11 @@ pub struct Estimate {
     pub windows: usize,
 }
 
-/// Converts some blocks, spread over the volume and over time, and scales their size to the whole archive. For a bound
-/// that refers to a range.
+/// Converts some blocks, spread over the volume and over time, and scales their size to the whole archive, for several
+/// configurations, which differ only in their tolerance. For a bound that refers to a range.
 ///
 /// # Errors
 /// Those of a conversion; also an error if the source is a stream.
-pub fn estimate(source: &mut dyn FrameSource, config: &ConvertConfig, progress: &dyn Progress) -> Result<Estimate> {
-    estimates(source, std::slice::from_ref(config), progress)?
-        .pop()
-        .ok_or_else(|| Error::setting("tolerance", "is needed for an estimate"))
-}
-
-/// As [`estimate`] for several configurations, which differ only in their tolerance.
-///
-/// # Errors
-/// Those of [`estimate`].
 pub fn estimates(
     source: &mut dyn FrameSource,
     configs: &[ConvertConfig],

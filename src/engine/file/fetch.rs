@@ -3,13 +3,12 @@
 
 use super::CoefficientFile;
 use crate::remote::{FETCHED, PageCount};
-use rayon::prelude::*;
 use std::ops::Range;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
-use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
+use wavesplat_format::{BlockEntry, LeafEntry, PartEntry, Storage};
 
 /// Blocks that are fetched together to be checked.
 pub(super) const BLOCKS_TOGETHER: usize = 32;
@@ -134,43 +133,5 @@ impl CoefficientFile {
     /// Fetches all of some blocks.
     pub(crate) fn fetch_whole(&self, entries: &[BlockEntry]) -> Result<()> {
         self.fetch_parts(entries.iter().flat_map(|entry| &entry.parts))
-    }
-
-    /// The samples of whole blocks, decoded side by side: of each block all frames of its window, little-endian in the
-    /// file's [type](Self::sample), x fastest, then y, z, and time slowest. [`Self::blocks`] says which voxels a block has.
-    ///
-    /// A remote file is asked for all blocks of a window at once. The result is held in memory: ask for as many blocks as
-    /// fit.
-    ///
-    /// # Errors
-    /// [`Error::CoefficientFile`](wavesplat_core::base::error::Error::CoefficientFile) for a block that is damaged or that
-    /// the file lacks.
-    pub fn read_blocks(&self, ids: &[BlockId]) -> Result<Vec<Vec<u8>>> {
-        let mut blocks = Vec::with_capacity(ids.len());
-        for ids in ids.chunk_by(|a, b| a.window == b.window) {
-            let entries = self.entries_of(ids)?;
-            let codec = self.codec(ids[0].window)?;
-            let all = vec![true; codec.basis.coefficients()];
-            self.fetch_blocks(&codec, &entries, &all)?;
-            let decode =
-                |entry: &BlockEntry| self.block(&codec, entry, &all).map(|block| block.samples(&codec).to_vec());
-            blocks.extend(entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?);
-        }
-        Ok(blocks)
-    }
-
-    /// The entries of some blocks; a leaf of the directory is read once for neighbours.
-    fn entries_of(&self, ids: &[BlockId]) -> Result<Vec<BlockEntry>> {
-        let mut leaf = Vec::new();
-        let find = |leaf: &[BlockEntry], id| leaf.iter().find(|entry| entry.id == id).cloned();
-        let mut entry = |id: BlockId| {
-            if let Some(found) = find(&leaf, id) {
-                return Ok(found);
-            }
-            let holds = |l: &&_| LeafEntry::ids(l).any(|held| held == id);
-            leaf = self.leaves(id.window).iter().find(holds).map_or(Ok(Vec::new()), |l| self.leaf(l))?;
-            find(&leaf, id).ok_or_else(|| self.contradiction(format!("{id}: the archive has no such block")))
-        };
-        ids.iter().map(|id| entry(*id)).collect()
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::time::{SystemTime, UNIX_EPOCH};
+use wavesplat_core::base::time_labels::TimeLabels;
 
 /// What times depend on besides the program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,36 +60,6 @@ fn cpu() -> Option<String> {
 /// The day of the clock in UTC, as 2024-02-29.
 pub(super) fn today() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    date(seconds / (24 * 60 * 60))
-}
-
-/// The date so many days after 1970-01-01.
-fn date(mut days: u64) -> String {
-    let leap = |year: u64| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    let mut year = 1970;
-    while days >= 365 + u64::from(leap(year)) {
-        days -= 365 + u64::from(leap(year));
-        year += 1;
-    }
-    let mut month = 1;
-    for length in [31, 28 + u64::from(leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30, 31] {
-        if days < length {
-            break;
-        }
-        days -= length;
-        month += 1;
-    }
-    format!("{year}-{month:02}-{:02}", days + 1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::date;
-
-    #[test]
-    fn dates_know_leap_years() {
-        let dates = [0, 59, 789, 790, 11_016, 19_782, 20_453].map(date);
-        let known = ["1970-01-01", "1970-03-01", "1972-02-29", "1972-03-01", "2000-02-29", "2024-02-29", "2025-12-31"];
-        assert_eq!(dates, known);
-    }
+    let day = vec![(seconds / (24 * 60 * 60)) as f64];
+    TimeLabels::new(day, Some("days since 1970-01-01"), None).date(0).unwrap_or_default()
 }

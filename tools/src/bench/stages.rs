@@ -6,6 +6,7 @@ use super::plan::{BASES, BOUNDS};
 use super::process::ProcessTask;
 use super::reference::{ImageError, ReferencePixels};
 use super::textbook;
+use crate::scenes::MEMORY;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::BufReader;
@@ -114,9 +115,6 @@ impl ProcessTask for Render {
         render(self)
     }
 }
-
-/// The programs' default memory budget.
-pub(super) const MEMORY: usize = 512 << 20;
 
 /// The first `count` frames of an archive.
 pub(super) fn open_frames(path: &Path, count: usize) -> Result<Box<dyn FrameSource>> {

@@ -10,7 +10,7 @@ mod table;
 use crate::diff::measure::Differences;
 use crate::eddy::{Magnet, Plate, eddy_currents};
 use crate::output::{Format, Shape, Target};
-use crate::scenes::{MEMORY, converted, pictures, projection};
+use crate::scenes::{MEMORY, converted, pictures};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
@@ -21,9 +21,10 @@ use wavesplat::convert::{Basis, ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::{Comparison, verify};
 use wavesplat::formats;
-use wavesplat::render::{CoefficientScene, FrameScene, RenderReport, Scene, SplatSource};
+use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, RenderReport, Scene, SplatSource};
 use wavesplat::source::{self, FrameSource, OpenOptions};
 use wavesplat::view::camera::View;
+use wavesplat::view::footprint::Kernel;
 
 /// Frames of the experiment.
 pub const FRAMES: usize = 32;
@@ -213,7 +214,8 @@ impl Demo {
         let view = View { azimuth: 0.0, elevation: 90.0, roll: 0.0, size: self.size, scale: None, center: None };
         let thickness = self.plate.spacing * self.plate.dims[2] as f64;
         let tau = 1.0 / (ATTENUATION * thickness);
-        let config = projection(scene.grid(), view, tau, (0..FRAMES).collect(), SPLAT_ERROR)?;
+        let kernel = Kernel::new(None, tau, scene.grid())?;
+        let config = RenderConfig { kernel, splat_error: SPLAT_ERROR, ..RenderConfig::new(scene, view) };
         pictures(scene, &config)
     }
 }

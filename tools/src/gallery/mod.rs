@@ -5,7 +5,7 @@ mod tiles;
 use crate::demo;
 use crate::eddy::Plate;
 use crate::output::{Format, Shape, Target};
-use crate::scenes::{MEMORY, converted, pictures, projection};
+use crate::scenes::{MEMORY, converted, pictures};
 use crate::sheet::{GAP, Image, LETTER, Rgb, contact_sheet, stacked, titled};
 use crate::synth::{Kind, Synth};
 use clap::ValueEnum;
@@ -92,7 +92,7 @@ impl Gallery {
         let file = self.converted(&input, name, None)?;
         say(&format!("rendering {archive} in all modes"));
         let mut scene = CoefficientScene::new(file.clone(), SplatSource::Coefficients);
-        let base = self.base(&scene)?;
+        let base = self.base(&scene);
         let look = self.look(&mut scene, &base, &file)?;
         let mut images = Vec::new();
         for tile in look.tiles()? {
@@ -150,10 +150,11 @@ impl Gallery {
     }
 
     /// The middle frame, as all modes see it.
-    fn base(&self, scene: &dyn Scene) -> Result<RenderConfig> {
+    fn base(&self, scene: &dyn Scene) -> RenderConfig {
         let [azimuth, elevation] = VIEW;
         let view = View { azimuth, elevation, roll: 0.0, size: [self.side; 2], scale: None, center: None };
-        projection(scene.grid(), view, 0.0, vec![scene.frames().unwrap_or(0) / 2], TOLERANCE / 2.0)
+        let (frames, splat_error) = (vec![scene.frames().unwrap_or(0) / 2], TOLERANCE / 2.0);
+        RenderConfig { frames, splat_error, ..RenderConfig::new(scene, view) }
     }
 
     /// Chooses settings that suit the samples, by the largest ones that rays meet.

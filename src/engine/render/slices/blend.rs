@@ -2,7 +2,7 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
-use super::row::{Blend, Point, Row};
+use super::row::{Blend, CLOSED, Point, Row};
 use super::shade::{Lit, Shader};
 use super::table::{ENTRIES, Table};
 use super::view::SlicedView;
@@ -33,9 +33,6 @@ impl Composite {
     }
 }
 
-/// Rays with less transmittance are opaque: the rest is a thirtieth of a level of an 8-bit picture.
-const CLOSED: f32 = 1.0 / 8192.0;
-
 impl Blend for Composite {
     /// Red, green and blue of the light, and the transmittance.
     type Group = [[f32; 4]; GROUP];
@@ -45,10 +42,7 @@ impl Blend for Composite {
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is at least the largest transmittance of a group.
     const OPEN: f32 = GROUP as f32;
-    const OVER: f32 = 0.0;
     const LEAST: f32 = super::LEAST;
-    const CENTRED: bool = false;
-    const NUMBERS: usize = 4;
 
     fn units(&self, _: f64) -> Units {
         self.table.units
@@ -66,14 +60,6 @@ impl Blend for Composite {
         self.table.shows(range.0, range.1)
     }
 
-    fn hides(limit: f32, _: (f32, f32)) -> bool {
-        Self::is_closed(limit)
-    }
-
-    fn is_closed(limit: f32) -> bool {
-        limit < CLOSED
-    }
-
     fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]) {
         match &self.shader {
             Some(shader) => dispatch!(add_shaded(row, &self.table.entries, shader, groups, limits)),
@@ -87,10 +73,6 @@ impl Blend for Composite {
 
     fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], weights: [[f32; 4]; 2], out: &mut [f32]) {
         pixel_of_light(cells, weights, out);
-    }
-
-    fn background(out: &mut [f32]) {
-        out.fill(0.0);
     }
 
     type Exact = ([f64; 4], bool);

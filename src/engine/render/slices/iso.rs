@@ -33,9 +33,6 @@ pub(in crate::render) struct Front {
     slice: u32,
 }
 
-/// Rays with less transmittance are opaque.
-const CLOSED: f32 = 1.0 / 8192.0;
-
 impl Isosurfaces {
     pub(in crate::render) fn new(surfaces: &[Surface], light: Light, view: &SlicedView) -> Self {
         let shader = Shader::new(light, view, 0.0);
@@ -81,10 +78,7 @@ impl Blend for Isosurfaces {
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is the largest transmittance of a group.
     const OPEN: f32 = 1.0;
-    const OVER: f32 = 0.0;
     const LEAST: f32 = 0.01;
-    const CENTRED: bool = false;
-    const NUMBERS: usize = 4;
 
     fn units(&self, _: f64) -> Units {
         self.units
@@ -96,14 +90,6 @@ impl Blend for Isosurfaces {
 
     fn shows(&self, range: (f32, f32)) -> bool {
         self.values.iter().any(|value| range.0 <= *value && *value <= range.1)
-    }
-
-    fn hides(limit: f32, _: (f32, f32)) -> bool {
-        Self::is_closed(limit)
-    }
-
-    fn is_closed(limit: f32) -> bool {
-        limit < CLOSED
     }
 
     fn add(&self, row: &Row<'_>, groups: &mut [Front], limits: &mut [f32]) {
@@ -130,10 +116,6 @@ impl Blend for Isosurfaces {
 
     fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], weights: [[f32; 4]; 2], out: &mut [f32]) {
         pixel_of_light(cells, weights, out);
-    }
-
-    fn background(out: &mut [f32]) {
-        out.fill(0.0);
     }
 
     /// The light, and the last point.

@@ -162,6 +162,9 @@ pub(in crate::render) struct Point {
     pub(super) gradient: [f64; 3],
 }
 
+/// Rays with less transmittance are opaque: the rest is a thirtieth of a level of an 8-bit picture.
+pub(super) const CLOSED: f32 = 1.0 / 8192.0;
+
 /// A way to combine the slices along the rays of cells.
 pub(in crate::render) trait Blend: Sync {
     /// The state of sixteen cells.
@@ -175,11 +178,11 @@ pub(in crate::render) trait Blend: Sync {
     /// The limit of a group before the first slice.
     const OPEN: f32;
     /// Whether units depend on a value near those of the frame.
-    const CENTRED: bool;
+    const CENTRED: bool = false;
     /// Where the density is less, there is nothing.
     const LEAST: f32;
     /// Numbers per pixel.
-    const NUMBERS: usize;
+    const NUMBERS: usize = 4;
 
     /// The units of values. `middle` is a value near those of the frame.
     fn units(&self, middle: f64) -> Units;
@@ -198,13 +201,17 @@ pub(in crate::render) trait Blend: Sync {
     fn shows(&self, range: (f32, f32)) -> bool;
 
     /// Whether cells with this limit hide all values in this range.
-    fn hides(limit: f32, range: (f32, f32)) -> bool;
+    fn hides(limit: f32, _range: (f32, f32)) -> bool {
+        Self::is_closed(limit)
+    }
 
     /// Whether cells with this limit hide everything.
-    fn is_closed(limit: f32) -> bool;
+    fn is_closed(limit: f32) -> bool {
+        limit < CLOSED
+    }
 
     /// The limit of a group after all its rays have ended.
-    const OVER: f32;
+    const OVER: f32 = 0.0;
 
     /// Adds the live groups of a row behind the slices before, and updates their limits.
     fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]);
@@ -228,5 +235,7 @@ pub(in crate::render) trait Blend: Sync {
     fn off(ray: &Self::Exact, pixel: &[f32]) -> Option<f64>;
 
     /// The numbers of a pixel that no ray meets.
-    fn background(out: &mut [f32]);
+    fn background(out: &mut [f32]) {
+        out.fill(0.0);
+    }
 }

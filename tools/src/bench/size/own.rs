@@ -3,7 +3,7 @@
 use super::clock::{least, stay_on_one_core};
 use super::schemes;
 use crate::bench::process::ProcessTask;
-use crate::bench::stages::MEMORY;
+use crate::scenes::MEMORY;
 use memmap2::MmapMut;
 use serde::{Deserialize, Serialize};
 use std::fs;
