@@ -34,7 +34,8 @@ fn a_lattice_keeps_the_error_that_it_states() {
     for (n, (grid, view, tau)) in scenes().into_iter().enumerate() {
         let mut samples = field(&grid, FRAMES, n as u64);
         samples.iter_mut().for_each(|v| *v += 20.0); // an offset must not make means worse
-        let scale = view.scale.unwrap();
+        let mean = looking(view, tau, Quantity::Mean, &grid, FRAMES);
+        let seen = truth(&grid, &mean, view.scale.unwrap(), &vec![0.0; grid.whole().voxels()], None);
         for (i, convert) in configs().into_iter().enumerate() {
             let mut memory = archive(grid, SampleType::F64, &samples);
             let stored = stored(&mut memory, &convert);
@@ -45,7 +46,6 @@ fn a_lattice_keeps_the_error_that_it_states() {
                 let region = (i == 1).then_some(region);
                 let exact = RenderConfig { region, splat_error: 0.0, ..plain.clone() };
                 let quick = RenderConfig { region, splat_error: 5e-3, ..plain };
-                let seen = truth(&grid, &exact, scale, &vec![0.0; grid.whole().voxels()], None);
                 let largest = (1.01 * largest(&samples), 1.02 * span(&samples));
                 found += keeps_its_error(&mut scene, [&exact, &quick], (largest, &seen), &format!("scene {n}, {i}"));
             }
@@ -224,10 +224,11 @@ fn invisible_depths_are_omitted_within_the_stated_error() {
     let mut dimmed = [Vec::new(), Vec::new()];
     for (n, (tau, scale)) in [(0.0, 1.5), (0.1, 1.5), (0.3, 1.5), (1.0, 0.7)].into_iter().enumerate() {
         let view = View { scale: Some(scale), ..view(0.0, 20.0 * (n % 2) as f64, [50, 45]) };
+        let mean = looking(view, tau, Quantity::Mean, &grid, FRAMES);
+        let seen = truth(&grid, &mean, scale, &vec![0.0; grid.whole().voxels()], None);
         for (dimmed, quantity) in dimmed.iter_mut().zip([Quantity::Emission, Quantity::Mean]) {
             let exact = looking(view, tau, quantity, &grid, FRAMES);
             let quick = RenderConfig { splat_error: 5e-3, ..exact.clone() };
-            let seen = truth(&grid, &exact, scale, &vec![0.0; grid.whole().voxels()], None);
             let mut scene = CoefficientScene::new(stored.open(), SplatSource::Coefficients);
             keeps_its_error(&mut scene, [&exact, &quick], (largest, &seen), &format!("tau {tau}, {quantity:?}"));
             let (all, some) = (pictures(&mut scene, &exact).1, pictures(&mut scene, &quick).1);

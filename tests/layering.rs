@@ -156,6 +156,18 @@ fn modules(code: &str) -> Vec<String> {
     code.lines().filter(|line| !line.starts_with(' ')).filter_map(module).collect()
 }
 
+/// The names that a folder passes on, and the modules that have them.
+fn passed_on(folder: &str, all: &[(String, String)]) -> Vec<(String, String)> {
+    let root = if PACKAGES.iter().any(|(package, _)| *package == folder) { "lib" } else { "mod" };
+    let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/{root}.rs")).expect("a folder with modules");
+    let passed = |path: &str| {
+        let (module, names) = path.split_once("::")?;
+        let names = named(names).into_iter().map(|name| (name.to_string(), module.to_string()));
+        Some(names.collect::<Vec<_>>())
+    };
+    code.split("use ").skip(1).filter_map(passed).flatten().collect()
+}
+
 /// The modules of a folder that a file below it names. `below` is the file's path from there.
 fn siblings<'a>(folder: &str, below: &str, code: &'a str) -> Vec<&'a str> {
     let levels = below.matches('/').count() + usize::from(!below.ends_with("mod.rs"));
@@ -180,17 +192,49 @@ fn named(rest: &str) -> Vec<&str> {
 fn modules_are_listed_from_the_lowest_to_the_highest() {
     let all = sources();
     for folder in ORDERED {
-        let order = listed(folder, &all);
+        let (order, passed) = (listed(folder, &all), passed_on(folder, &all));
         assert!(order.len() > 1, "{folder} lists its modules");
         for (path, code) in &all {
             let Some(below) = path.strip_prefix(&format!("{folder}/")) else { continue };
             let own = below.split('/').next().unwrap().trim_end_matches(".rs");
             let Some(at) = order.iter().position(|module| module == own) else { continue };
             for used in siblings(folder, below, code) {
-                let Some(other) = order.iter().position(|module| module == used) else { continue };
+                let home = passed.iter().find(|(name, _)| name == used).map_or(used, |(_, module)| module);
+                let Some(other) = order.iter().position(|module| module == home) else { continue };
                 assert!(other <= at, "src/{path}: {own} is listed before {used} in {folder}, so it may not use it");
             }
         }
+    }
+}
+
+/// The modules of a folder that each of its modules uses, without tests.
+fn uses<'a>(folder: &str, all: &'a [(String, String)]) -> Vec<(String, Vec<String>)> {
+    let (order, passed) = (listed(folder, all), passed_on(folder, all));
+    let home =
+        |used: &str| passed.iter().find(|(name, _)| name == used).map_or(used.into(), |(_, module)| module.clone());
+    let of = |own: &String| {
+        let files = all.iter().filter_map(|(path, code)| Some((path.strip_prefix(&format!("{folder}/"))?, code)));
+        let files = files.filter(|(below, _)| below.split('/').next().unwrap().trim_end_matches(".rs") == own);
+        let files = files.filter(|(below, _)| !below.ends_with("tests.rs") && !below.ends_with("testing.rs"));
+        let outside = |code: &'a str| code.split("#[cfg(test)]\nmod tests").next().unwrap();
+        let used = files.flat_map(|(below, code)| siblings(folder, below, outside(code))).map(home);
+        (own.clone(), used.filter(|used| used != own && order.contains(used)).collect())
+    };
+    order.iter().map(of).collect()
+}
+
+#[test]
+fn no_modules_use_each_other_in_a_circle() {
+    let all = sources();
+    let folders = all.iter().filter_map(|(path, _)| path.strip_suffix("/mod.rs").or(path.strip_suffix("/lib.rs")));
+    for folder in folders {
+        let mut left = uses(folder, &all);
+        loop {
+            let lowest = |used: &[String]| used.iter().all(|used| left.iter().all(|(other, _)| other != used));
+            let Some(at) = left.iter().position(|(_, used)| lowest(used)) else { break };
+            left.remove(at);
+        }
+        assert!(left.is_empty(), "src/{folder}: a circle among {left:?}");
     }
 }
 

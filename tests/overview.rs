@@ -62,7 +62,9 @@ fn coded_first(window: usize) -> [usize; 4] {
 fn an_overview_of_a_file_holds_the_samples_that_extraction_gives() {
     let mut random = Random(83);
     let (mut cases, mut exact) = (0, 0);
-    for ((basis, window), kind) in windows(16).into_iter().flat_map(|basis| KINDS.map(|kind| (basis, kind))) {
+    for ((basis, window), kind) in
+        windows(16).into_iter().flat_map(|basis| KINDS.into_iter().step_by(4).map(move |kind| (basis, kind)))
+    {
         for (ty, mask) in
             [(SampleType::F32, Mask::None), (SampleType::F32, Mask::Special), (SampleType::F64, Mask::Most)]
         {
@@ -92,7 +94,7 @@ fn an_overview_of_a_file_holds_the_samples_that_extraction_gives() {
             }
         }
     }
-    assert!(cases > 1_000_000 && exact as f64 > 0.9 * cases as f64, "{exact} of {cases}");
+    assert!(cases > 250_000 && exact as f64 > 0.9 * cases as f64, "{exact} of {cases}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Tips for arguments that are not understood.
 
 use super::config::{Config, chosen_command};
-use super::other_program;
+use super::programs::other_program;
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use std::ffi::OsString;

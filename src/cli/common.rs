@@ -1,12 +1,12 @@
 //! Options of every program: worker threads, notes, progress and reports.
 
+use super::messages::{self, note};
 use super::terminal::{ProgressKind, TerminalProgress};
 use super::values::Size;
-use super::{messages, note_text, print};
+use super::{note_text, print};
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Arguments;
-use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Note, Result};
@@ -119,8 +119,4 @@ impl Reporter for CommonArgs {
 /// The text is not a whole number above 0.
 fn threads(text: &str) -> std::result::Result<NonZeroUsize, String> {
     text.parse().map_err(|_| "takes a whole number, at least 1; without it, each core has one thread".into())
-}
-
-pub(super) fn note(text: impl std::fmt::Display) {
-    let _ = writeln!(io::stderr().lock(), "{text}"); // a failure cannot be reported anywhere else
 }

@@ -4,7 +4,7 @@
 //! table is for the command or program of that name. The options are inserted before those of the command line, which override
 //! them.
 
-use super::other_program;
+use super::programs::other_program;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use std::env;

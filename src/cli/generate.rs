@@ -1,7 +1,7 @@
 //! Completions for shells, and man pages.
 
 use super::print;
-use clap::{Command, Subcommand, ValueEnum};
+use clap::{Command, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use clap_mangen::Man;
 use std::fmt::Write as _;
@@ -11,6 +11,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::Output;
+
+/// The arguments of a program. Its help begins with examples.
+pub fn command<A: Parser>() -> Command {
+    const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\n{before-help}{all-args}{after-help}";
+    A::command().help_template(HELP).mut_subcommands(|command| command.help_template(HELP))
+}
 
 /// What to generate for a program with several commands.
 #[derive(Debug, Clone, Subcommand)]

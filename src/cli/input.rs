@@ -1,7 +1,7 @@
 //! Options for reading an archive.
 
 use super::{CommonArgs, RemoteArgs, note_text};
-use super::{Dims, FrameRange, RegionSpec, TimesSpec, Triple, times};
+use super::{Dims, FrameRange, Numbers, Pair, RegionSpec, TimesSpec, Triple, times};
 use clap::{Args, ValueEnum};
 use std::fmt;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::Access;
 use wavesplat_core::base::sample::SampleType;
-use wavesplat_core::source::{self, FrameSource, OpenOptions, Selection, VariableInfo};
+use wavesplat_core::source::{self, FrameSource, OpenOptions, RegularTimes, Selection, VariableInfo, with_times};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::setting;
 use wavesplat_formats as formats;
@@ -102,7 +102,7 @@ impl InputArgs {
     /// # Errors
     /// A list of times that cannot be read.
     pub fn open_options(&self, memory: usize) -> Result<OpenOptions> {
-        Ok(OpenOptions { times: self.given_times()?, ..self.options(memory) })
+        Ok(OpenOptions { times: times::given(self.times.as_ref(), self.dt)?, ..self.options(memory) })
     }
 
     /// Opens an archive and prints no notes. Decoded or piped frames may take `memory` bytes.
@@ -173,7 +173,7 @@ impl InputArgs {
             ("offset", self.offset.map(|bytes| bytes.to_string())),
             ("spacing", self.spacing.map(|s| s.to_string())),
             ("origin", self.origin.map(|o| o.to_string())),
-            (times::TIMES, self.times_setting()),
+            (times::TIMES, times::setting_value(self.times.as_ref(), self.dt)),
             ("time-unit", self.time_unit.clone()),
         ];
         given.into_iter().filter_map(|(name, value)| Some((name, value?)))
@@ -215,12 +215,33 @@ impl InputArgs {
             dims_are_remembered: !self.describes_layout(),
             variable_is_remembered: self.variable.is_none(),
             clock: Some(times::units(file)),
-            times: self.given_times()?,
+            times: times::given(self.times.as_ref(), self.dt)?,
             ..self.completed(file)?.options(common.stream_memory())
         };
         let source = formats::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
         narrow(source, frames, remembered(file, "region")?)
+    }
+
+    /// Gives frames that are appended to a file the times that follow in its steps, if it was converted with regular
+    /// times. `source` has every `every`-th frame of its archive.
+    pub(super) fn go_on_in_time(
+        &self,
+        file: &CoefficientFile,
+        source: Box<dyn FrameSource>,
+        every: usize,
+    ) -> Result<Box<dyn FrameSource>> {
+        let last = file.metadata().times.last();
+        let (Some(stored), Some(last), None, None) =
+            (setting(file.metadata(), times::TIMES), last, &self.times, self.dt)
+        else {
+            return Ok(source);
+        };
+        if stored == times::LIST {
+            return Err(Error::usage("the times of the file are from a list: --times gives those of the new frames"));
+        }
+        let Some(Numbers([start, step])) = remembered::<Pair>(file, times::TIMES)? else { return Ok(source) };
+        Ok(with_times(source, RegularTimes::new(start, step)?.after(*last, every), &times::units(file)))
     }
 
     /// Whether an option that describes headerless data is given.

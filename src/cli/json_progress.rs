@@ -1,6 +1,6 @@
 //! Progress as lines of JSON.
 
-use super::common::note;
+use super::messages::note;
 use serde::Serialize;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

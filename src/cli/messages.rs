@@ -2,6 +2,7 @@
 
 use clap::Command;
 use std::borrow::Cow;
+use std::io::{self, Write};
 use wavesplat_core::base::error::{Error, Note, Remedy};
 use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::is_field;
@@ -20,6 +21,10 @@ pub fn error_text(error: &Error, command: &Command) -> String {
 /// A text about pictures, with options in place of the fields that it has in backquotes.
 pub(super) fn picture_text(text: &str) -> String {
     worded(text, |quoted| is_field(quoted).then(|| format!("--{}", name(quoted))))
+}
+
+pub(super) fn note(text: impl std::fmt::Display) {
+    let _ = writeln!(io::stderr().lock(), "{text}"); // a failure cannot be reported anywhere else
 }
 
 /// The text of a note, with advice if it has a remedy.

@@ -1,11 +1,12 @@
 //! A program from its arguments to its exit code.
 
 use super::advice;
-use super::common::note;
 use super::config::Config;
-use super::{commands, messages, render};
+use super::generate::command;
+use super::messages;
+use super::messages::note;
+use clap::Parser;
 use clap::error::ErrorKind;
-use clap::{Command, CommandFactory, Parser};
 use std::env;
 use std::ffi::OsString;
 use std::io::{self, IsTerminal};
@@ -18,8 +19,9 @@ use wavesplat_core::base::output::abandon;
 pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     mapped::explain_sigbus();
     mapped::on_interrupt(end);
-    let (args, config) = match arguments::<A>() {
-        Ok(read) => read,
+    let args: Vec<OsString> = env::args_os().collect();
+    let config = match Config::read(&command::<A>(), &args) {
+        Ok(config) => config,
         Err(e) => return failed::<A>(&e),
     };
     let args = match parse::<A>(&args, &config) {
@@ -39,13 +41,6 @@ pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
             code
         }
     }
-}
-
-/// The command line, and the file of options.
-fn arguments<A: Parser>() -> Result<(Vec<OsString>, Config)> {
-    let (command, args) = (command::<A>(), env::args_os().collect::<Vec<_>>());
-    let config = Config::read(&command, &args)?;
-    Ok((args, config))
 }
 
 /// Ends the program on a signal. Keeps unfinished files that can be resumed, and removes the others.
@@ -74,18 +69,4 @@ fn parse<A: Parser>(args: &[OsString], config: &Config) -> std::result::Result<A
     let all = config.add_to(&command, args);
     let parsed = command.try_get_matches_from_mut(all).and_then(|matches| A::from_arg_matches(&matches));
     parsed.map_err(|error| advice::with_tip(error, &command, args, config))
-}
-
-/// The other of the two programs, which may read the same file of options.
-pub(super) fn other_program(program: &Command) -> Command {
-    match program.get_name() {
-        "wavesplat" => render::Program::command(),
-        _ => commands::Cli::command(),
-    }
-}
-
-/// The arguments of a program. Its help begins with examples.
-pub fn command<A: Parser>() -> Command {
-    const HELP: &str = "{about-with-newline}\n{usage-heading} {usage}\n\n{before-help}{all-args}{after-help}";
-    A::command().help_template(HELP).mut_subcommands(|command| command.help_template(HELP))
 }

@@ -1,14 +1,12 @@
 //! The options of times: those of the user in place of those in the files.
 
-use super::remembered;
-use super::{InputArgs, Numbers, Pair};
+use super::{Numbers, Pair};
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::source::{FrameSource, Units, with_times};
-use wavesplat_core::source::{GivenTimes, RegularTimes};
+use wavesplat_core::source::{GivenTimes, RegularTimes, Units};
 use wavesplat_engine::file::{CoefficientFile, setting};
 
 /// `START,STEP`, or a file with a number for each frame.
@@ -38,17 +36,24 @@ pub(super) fn step(text: &str) -> std::result::Result<f64, String> {
 pub(super) const TIMES: &str = "times";
 
 /// Its value for times from a file, which other frames cannot reuse.
-const LIST: &str = "list";
+pub(super) const LIST: &str = "list";
 
-impl InputArgs {
-    /// The times that are given.
-    pub(super) fn given_times(&self) -> Result<Option<GivenTimes>> {
-        match (&self.times, self.dt) {
-            (Some(TimesSpec::File(path)), _) => read(path).map(|times| Some(GivenTimes::List(times.into()))),
-            (Some(TimesSpec::Regular(Numbers([start, step]))), _) => regular(*start, *step).map(Some),
-            (None, Some(step)) => regular(0.0, step).map(Some),
-            (None, None) => Ok(None),
-        }
+/// The times that `--times` or `--dt` give.
+pub(super) fn given(times: Option<&TimesSpec>, step: Option<f64>) -> Result<Option<GivenTimes>> {
+    match (times, step) {
+        (Some(TimesSpec::File(path)), _) => read(path).map(|times| Some(GivenTimes::List(times.into()))),
+        (Some(TimesSpec::Regular(Numbers([start, step]))), _) => regular(*start, *step).map(Some),
+        (None, Some(step)) => regular(0.0, step).map(Some),
+        (None, None) => Ok(None),
+    }
+}
+
+/// The value of the setting for them.
+pub(super) fn setting_value(times: Option<&TimesSpec>, step: Option<f64>) -> Option<String> {
+    match (times, step) {
+        (Some(TimesSpec::File(_)), _) => Some(LIST.into()),
+        (Some(TimesSpec::Regular(times)), _) => Some(times.to_string()),
+        (None, step) => step.map(|step| Numbers([0.0, step]).to_string()),
     }
 }
 
@@ -97,37 +102,6 @@ fn time(line: &[u8]) -> std::result::Result<Option<f64>, String> {
             let shown: String = text.chars().take(MOST_SHOWN).collect();
             number.map(Some).ok_or_else(|| format!("{shown:?} is no finite number"))
         }
-    }
-}
-
-impl InputArgs {
-    /// The value of the setting for the given times.
-    pub(super) fn times_setting(&self) -> Option<String> {
-        match (&self.times, self.dt) {
-            (Some(TimesSpec::File(_)), _) => Some(LIST.into()),
-            (Some(TimesSpec::Regular(times)), _) => Some(times.to_string()),
-            (None, step) => step.map(|step| Numbers([0.0, step]).to_string()),
-        }
-    }
-
-    /// Gives frames that are appended to a file the times that follow in its steps, if it was converted with regular
-    /// times. `source` has every `every`-th frame of its archive.
-    pub fn go_on_in_time(
-        &self,
-        file: &CoefficientFile,
-        source: Box<dyn FrameSource>,
-        every: usize,
-    ) -> Result<Box<dyn FrameSource>> {
-        let last = file.metadata().times.last();
-        let (Some(stored), Some(last), None, None) = (setting(file.metadata(), TIMES), last, &self.times, self.dt)
-        else {
-            return Ok(source);
-        };
-        if stored == LIST {
-            return Err(Error::usage("the times of the file are from a list: --times gives those of the new frames"));
-        }
-        let Some(Numbers([start, step])) = remembered::<Pair>(file, TIMES)? else { return Ok(source) };
-        Ok(with_times(source, RegularTimes::new(start, step)?.after(*last, every), &units(file)))
     }
 }
 

@@ -4,6 +4,7 @@ use super::{Archive, Run, Work};
 use crate::common::http::{Fate, Server};
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
+use std::thread;
 use std::time::Instant;
 
 /// A file of several windows, whose ends hold a small part of it.
@@ -142,7 +143,7 @@ fn lasting_faults_are_explained() {
     let work = work();
     let refuse = |status, body: &str| Fate::Refuse(status, "Retry-After: 0\r\n".into(), body.into());
     let s3 = "<?xml version=\"1.0\"?><Error><Code>NoSuchKey</Code><Message>The key\nis not there.</Message></Error>";
-    for (fate, words) in [
+    let fates = [
         (Fate::Whole, vec!["cannot send parts of a file"]),
         (refuse(404, s3), vec!["no such file (404)", "The keyis not there."]),
         (refuse(403, ""), vec!["does not allow reading it (403)"]),
@@ -157,13 +158,20 @@ fn lasting_faults_are_explained() {
         (Fate::Drip, vec!["does not answer in time"]),
         (Fate::Nonsense, vec!["not understood"]),
         (Fate::Endless, vec!["sends more than"]),
-    ] {
+    ];
+    let is_explained = |fate: Fate, words: Vec<&str>| {
         let (shown, begin) = (format!("{fate:?}"), Instant::now());
         let server = Server::with(bytes().clone(), move |_| fate.clone());
         let run = work.remote(&server, "$WAVESPLAT info URL --timeout 0.1");
         assert!(begin.elapsed().as_secs() < 30, "{shown}");
         run.fails(1, &[&words[..], &["/run.wspl: opening: "]].concat());
-    }
+    };
+    // Side by side: most of them wait.
+    thread::scope(|scope| {
+        for (fate, words) in fates {
+            scope.spawn(|| is_explained(fate, words));
+        }
+    });
     let closed = "http://127.0.0.1:9/run.wspl";
     work.shell(&format!("NO_PROXY=127.0.0.1 $WAVESPLAT info {closed}")).fails(1, &[closed, "asked 5 times"]);
 }

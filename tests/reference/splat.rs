@@ -20,27 +20,36 @@ pub(crate) struct Images {
 
 /// Section 2, f(x, y): the attenuated projection of one voxel's kernel, x and y in world units from its centre.
 pub(crate) fn footprint(lattice: &Lattice, view: &View, x: f64, y: f64) -> f64 {
+    footprint_at_centre(lattice, view) * gaussian(view, x, y)
+}
+
+/// f(0, 0).
+fn footprint_at_centre(lattice: &Lattice, view: &View) -> f64 {
     let cell = lattice.spacing[0] * lattice.spacing[1] * lattice.spacing[2];
     let variance = view.sigma * view.sigma;
     let attenuation = (view.tau * view.tau * variance / 2.0).exp();
-    let gaussian = (-(x * x + y * y) / (2.0 * variance)).exp() / (2.0 * std::f64::consts::PI * variance);
-    cell * attenuation * gaussian
+    cell * attenuation / (2.0 * std::f64::consts::PI * variance)
+}
+
+/// f(x, y) / f(0, 0).
+fn gaussian(view: &View, x: f64, y: f64) -> f64 {
+    (-(x * x + y * y) / (2.0 * view.sigma * view.sigma)).exp()
 }
 
 /// Section 2, `w_i`(x, y) = exp(-tau `z_i`) f(x - `x_i`, y - `y_i`) of every voxel at the centre of pixel (a, b).
 pub(crate) fn weights(lattice: &Lattice, view: &View, a: usize, b: usize) -> Vec<f64> {
     let mut weights = Vec::new();
     for position in lattice.positions() {
-        weights.push(weight(lattice, view, project(lattice, view, position), a, b));
+        let [x, y, z] = project(lattice, view, position);
+        let (right, below) = from_centre(view, x, y, a, b);
+        weights.push((-view.tau * z).exp() * footprint(lattice, view, right, below));
     }
     weights
 }
 
-/// `w_i` of a voxel that is projected to (`x_i`, `y_i`, `z_i`) at the centre of pixel (a, b).
-fn weight(lattice: &Lattice, view: &View, [x, y, z]: [f64; 3], a: usize, b: usize) -> f64 {
-    let right = (a as f64 + 0.5 - x) / view.scale;
-    let below = (b as f64 + 0.5 - y) / view.scale;
-    (-view.tau * z).exp() * footprint(lattice, view, right, below)
+/// World units from a voxel that is projected to (`x_i`, `y_i`) to the centre of pixel (a, b).
+fn from_centre(view: &View, x: f64, y: f64, a: usize, b: usize) -> (f64, f64) {
+    ((a as f64 + 0.5 - x) / view.scale, (b as f64 + 0.5 - y) / view.scale)
 }
 
 /// Eq 1-4 and eq 12. `values` are `[t][z][y][x]`.
@@ -55,6 +64,9 @@ pub(crate) fn images(lattice: &Lattice, view: &View, values: &[f64], missing: Op
     assert!(missing.is_none_or(|missing| missing.len() == values.len()));
 
     let projected: Vec<[f64; 3]> = lattice.positions().iter().map(|&point| project(lattice, view, point)).collect();
+    // Each voxel's weight at its own place, which no pixel changes.
+    let centre = footprint_at_centre(lattice, view);
+    let own: Vec<f64> = projected.iter().map(|[_, _, z]| (-view.tau * z).exp() * centre).collect();
     let mut emission = vec![0.0; frames * pixels];
     let mut present_weight = vec![0.0; frames * pixels];
     let mut largest_weight = 0.0_f64;
@@ -63,7 +75,9 @@ pub(crate) fn images(lattice: &Lattice, view: &View, values: &[f64], missing: Op
             let pixel = b * view.width + a;
             let mut full_weight = 0.0;
             for voxel in 0..voxels {
-                let w = weight(lattice, view, projected[voxel], a, b);
+                let [x, y, _] = projected[voxel];
+                let (right, below) = from_centre(view, x, y, a, b);
+                let w = own[voxel] * gaussian(view, right, below);
                 full_weight += w;
                 for frame in 0..frames {
                     let sample = frame * voxels + voxel;

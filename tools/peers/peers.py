@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Peers of wavesplat: test archives, and what other coders make of them under the same bound.
 
-Nothing else in this project needs Python; `wavesplat-tools bench size --peers python3` runs this script.
+`wavesplat-tools bench size --peers python3` runs this script.
 
     pip install -r requirements.txt
     python3 peers.py generate plate vortex --out data/

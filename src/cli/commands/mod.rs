@@ -11,7 +11,7 @@ mod scan;
 mod several;
 mod verify;
 
-use crate::GenerateArgs;
+use crate::generate::{self, GenerateArgs};
 #[cfg(feature = "view")]
 use crate::view;
 use clap::{Parser, Subcommand};
@@ -72,7 +72,7 @@ impl Cli {
     /// Those of the command.
     pub fn run(self) -> Result<()> {
         match self.command {
-            Command::Convert(args) => convert::run(&args),
+            Command::Convert(args) => several::run(&args),
             Command::Append(args) => append::run(&args),
             Command::Info(args) => info::run(&args),
             Command::Verify(args) => verify::run(&args),
@@ -82,7 +82,7 @@ impl Cli {
             Command::Merge(args) => merge::run(&args),
             #[cfg(feature = "view")]
             Command::View(args) => view::run(&args),
-            Command::Generate(args) => args.run(crate::command::<Self>()),
+            Command::Generate(args) => args.run(generate::command::<Self>()),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Several variables of an archive, each converted to a file of its own.
 
-use super::convert::ConvertArgs;
+use super::convert::{self, ConvertArgs};
 use crate::InputArgs;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -12,8 +12,17 @@ const NAME: &str = "%n";
 /// The word for all variables.
 const ALL: &str = "all";
 
+/// Converts one variable, or several.
+pub(super) fn run(args: &ConvertArgs) -> Result<()> {
+    args.common.start()?;
+    match commands(args)? {
+        Some(commands) => commands.iter().try_for_each(convert::run),
+        None => convert::run(args),
+    }
+}
+
 /// The commands for each of several variables; none if one is meant.
-pub(super) fn commands(args: &ConvertArgs) -> Result<Option<Vec<ConvertArgs>>> {
+fn commands(args: &ConvertArgs) -> Result<Option<Vec<ConvertArgs>>> {
     let Some(names) = names(args)? else { return Ok(None) };
     let mut outputs = BTreeSet::new();
     let command = |Chosen { variable, name }: Chosen| {

@@ -1,7 +1,7 @@
 //! `--generate`: prints completions or the man page.
 
 use super::args::Cli;
-use crate::Generated;
+use crate::generate::{Generated, command};
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches, Id, Parser};
 use wavesplat_core::base::error::Result;
 use wavesplat_jobs::picture::exclude;
@@ -17,7 +17,7 @@ impl Program {
     pub fn run(self) -> Result<()> {
         match self {
             Self::Render(cli) => cli.run(),
-            Self::Generate(what) => what.run(crate::command::<Self>()),
+            Self::Generate(what) => what.run(command::<Self>()),
         }
     }
 }

@@ -12,7 +12,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
 
     /// The name of the value.
     fn name(self) -> &'static str {
-        Self::CHOICES.iter().find(|(_, value, _)| *value == self).map_or("", |(name, ..)| name)
+        Self::CHOICES.iter().find(|(_, value, _)| *value == self).expect("every value has a name").0
     }
 
     /// The value with a name.
@@ -22,7 +22,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     fn named(name: &str) -> Result<Self, String> {
         let found = Self::CHOICES.iter().find(|(known, ..)| *known == name);
         let names = || Self::CHOICES.iter().map(|(name, ..)| *name).collect::<Vec<_>>().join(" ");
-        found.map(|(_, value, _)| *value).ok_or_else(|| format!("one of {}", names()))
+        found.map(|(_, value, _)| *value).ok_or_else(|| format!("'{name}' is not one of {}", names()))
     }
 }
 

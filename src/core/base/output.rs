@@ -33,7 +33,7 @@ enum Target {
     /// A device or a pipe, written directly.
     Special(BufWriter<File>),
     /// The bytes that are committed go to the receiver.
-    Memory(Vec<u8>, Sender<Vec<u8>>),
+    Memory(InMemory, Sender<Vec<u8>>),
     File(Part, BufWriter<File>), // in this order: the file is removed before it is unlocked
 }
 
@@ -96,10 +96,12 @@ impl Output {
         Self::create_after(path, force, |file| file.set_len(0))
     }
 
-    /// Writes to memory. The bytes come from the receiver when the output is committed. `name` stands for it in messages.
-    pub fn to_memory(name: &str) -> (Self, Receiver<Vec<u8>>) {
-        let (committed, bytes) = channel();
-        (Self { path: name.into(), target: Target::Memory(Vec::new(), committed) }, bytes)
+    /// Writes up to `most` bytes to memory. They come from the receiver when the output is committed. `name` stands for it
+    /// in messages.
+    pub fn to_memory(name: &str, most: usize) -> (Self, Receiver<Vec<u8>>) {
+        let (committed, received) = channel();
+        let target = Target::Memory(InMemory { bytes: Vec::new(), most }, committed);
+        (Self { path: name.into(), target }, received)
     }
 
     fn create_after(path: &Path, force: bool, begin: impl FnOnce(&File) -> io::Result<()>) -> Result<Self> {
@@ -189,7 +191,7 @@ impl Output {
     pub fn commit_if(mut self, right: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         self.writer().flush().map_err(|e| Error::io(&self.path, "writing", e))?;
         if let Target::Memory(bytes, committed) = &mut self.target {
-            let _ = committed.send(std::mem::take(bytes)); // a receiver that is gone needs no bytes
+            let _ = committed.send(std::mem::take(&mut bytes.bytes)); // a receiver that is gone needs no bytes
         }
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
         file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
@@ -298,6 +300,26 @@ impl Output {
             Target::Memory(bytes, _) => bytes,
             Target::Special(out) | Target::File(_, out) => out,
         }
+    }
+}
+
+/// Bytes in memory, up to a number.
+#[derive(Debug)]
+struct InMemory {
+    bytes: Vec<u8>,
+    most: usize,
+}
+
+impl Write for InMemory {
+    fn write(&mut self, more: &[u8]) -> io::Result<usize> {
+        if more.len() > self.most - self.bytes.len() {
+            return Err(io::Error::other(format!("takes more than the {} bytes of memory", self.most)));
+        }
+        self.bytes.write(more)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 

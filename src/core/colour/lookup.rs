@@ -1,7 +1,6 @@
 //! Looks up the 8-bit colours of a map, instead of computing a colour for every pixel.
 
-use super::scale::bytes;
-use super::{Rgb, TransferFunction};
+use super::{Colour, Rgb, TransferFunction};
 
 /// The colours at shares of a map's range, 0 to 1.
 #[derive(Debug, Clone)]
@@ -69,6 +68,14 @@ fn both_sides(map: &TransferFunction, share: f64) -> Option<Rgb> {
     let colour = map.colour(share)?;
     let [less, more] = [-MARGIN, MARGIN].map(|margin| bytes(colour.map(|c| c + margin / 255.0)));
     (less == more).then_some(less)
+}
+
+/// Rounds to 8 bits per channel, halves up.
+pub(super) fn bytes(colour: Colour) -> Rgb {
+    colour.map(|c| {
+        let (level, whole) = (c * 255.0, (c * 255.0) as u8);
+        if level - f64::from(whole) >= 0.5 { whole.saturating_add(1) } else { whole } // f64::round is a slow call
+    })
 }
 
 #[cfg(test)]

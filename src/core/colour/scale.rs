@@ -1,6 +1,6 @@
 //! The colours of a picture's pixels.
 
-use super::lookup::Lookup;
+use super::lookup::{Lookup, bytes};
 use super::{Colour, Common, Distribution, Rgb, TransferFunction};
 use crate::base::choice::Choice;
 use crate::base::error::{Error, Note, Remedy, Result};
@@ -242,14 +242,6 @@ impl Scale {
     pub fn background(&self) -> Rgb {
         self.background
     }
-}
-
-/// Rounds to 8 bits per channel, halves up.
-pub(super) fn bytes(colour: Colour) -> Rgb {
-    colour.map(|c| {
-        let (level, whole) = (c * 255.0, (c * 255.0) as u8);
-        if level - f64::from(whole) >= 0.5 { whole.saturating_add(1) } else { whole } // f64::round is a slow call
-    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! Converts 64-bit integers to samples that hold them exactly.
 
-use super::packing::Packing;
 use crate::base::sample::{self, SampleType};
 use crate::base::stored::StoredType;
 
@@ -42,12 +41,17 @@ pub(crate) fn narrow(stored: StoredType, bytes: &[u8], out: &mut [u8]) -> Result
     Ok(())
 }
 
-/// Fills `out` with the samples (little-endian) of packed integers. An integer that an f64 does not hold exactly is an
-/// error, unless it is missing.
-pub(crate) fn unpack(stored: StoredType, packing: &Packing, bytes: &[u8], out: &mut [u8]) -> Result<(), Unfit> {
-    let ty = packing.sample(stored.sample());
+/// Fills `out` with the samples (little-endian, of type `ty`) that `unpacked` makes of integers. One that an f64 does not
+/// hold exactly is an error, unless its sample is NaN.
+pub(crate) fn unpack(
+    stored: StoredType,
+    ty: SampleType,
+    unpacked: impl Fn(f64) -> f64,
+    bytes: &[u8],
+    out: &mut [u8],
+) -> Result<(), Unfit> {
     for ((index, value), out) in integers(stored, bytes).enumerate().zip(out.chunks_exact_mut(ty.size())) {
-        let (number, sample) = (value as f64, packing.value(value as f64));
+        let (number, sample) = (value as f64, unpacked(value as f64));
         if number as i128 != value && !sample.is_nan() {
             return Err(Unfit { index, value });
         }
@@ -59,6 +63,7 @@ pub(crate) fn unpack(stored: StoredType, packing: &Packing, bytes: &[u8], out: &
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::packing::Packing;
 
     fn bytes(values: &[i64]) -> Vec<u8> {
         values.iter().flat_map(|value| value.to_le_bytes()).collect()
@@ -82,12 +87,12 @@ mod tests {
     fn packed_integers_are_exact_or_missing() {
         let packing = Packing { missing: vec![i64::MIN as f64], ..Packing::scaled(0.5, 1.0) };
         let mut out = vec![0; 24];
-        assert_eq!(unpack(StoredType::I64, &packing, &bytes(&[i64::MIN + 1, 1 << 53, -4]), &mut out), Ok(()));
+        assert_eq!(packing.unpack(StoredType::I64, &bytes(&[i64::MIN + 1, 1 << 53, -4]), &mut out), Ok(()));
         let mut values = [0.0; 3];
         sample::load(SampleType::F64, &out, &mut values);
         assert!(values[0].is_nan() && values[1..] == [2_f64.powi(52) + 1.0, -1.0], "{values:?}");
         let large = (1 << 53) + 1;
-        let found = unpack(StoredType::I64, &packing, &bytes(&[large]), &mut out);
+        let found = packing.unpack(StoredType::I64, &bytes(&[large]), &mut out);
         assert_eq!(found, Err(Unfit { index: 0, value: large.into() }));
     }
 }

@@ -49,10 +49,11 @@ impl Packing {
     /// # Errors
     /// Integers of 64 bits that are not exactly a sample.
     pub(crate) fn unpack(&self, stored: StoredType, bytes: &[u8], out: &mut [u8]) -> Result<(), Unfit> {
+        let ty = self.sample(stored.sample());
         if stored.is_64_bit() {
-            return int64::unpack(stored, self, bytes, out);
+            return int64::unpack(stored, ty, |number| self.value(number), bytes, out);
         }
-        let (stored, ty) = (stored.sample(), self.sample(stored.sample()));
+        let stored = stored.sample();
         let mut values = Vec::new();
         sample::for_each_run(stored, bytes, |first, numbers| {
             values.clear();

@@ -15,7 +15,8 @@
 //! 2. Append its variant to [`Basis`] in `format/src/window.rs`, and define its inverse in `format/FORMAT.md`, section
 //!    8.
 //! 3. Name it in [`AnyBasis`]: options, requests and files have that name. In `engine/convert`, say whether it takes a
-//!    pyramid and whether it is tried (`choose.rs`), and how many coefficients it has (`plan.rs`).
+//!    pyramid and whether it is tried (`choose.rs`), how many coefficients it has (`plan.rs`), and its default window and whether it works without a prediction
+//!    (`request.rs`).
 //! 4. Add it to the lists of tests: `every_basis` below, `tests/specification.rs`, which decodes it a second time from
 //!    `FORMAT.md`, `tests/golden.rs`, and `BASES` in `tests/common`.
 

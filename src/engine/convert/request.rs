@@ -10,6 +10,7 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::memory;
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{Archive, FrameSource};
+use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_format::{Basis, Bound};
 
 /// The request for a conversion. [`run`](super::run()) completes it from the frames.
@@ -40,8 +41,8 @@ pub struct ConvertRequest {
     pub transfer_function: Option<TransferFunction>,
     /// The transform along time: haar, multi, learned, pyramid or auto. Default: auto, the smallest.
     #[serde(with = "choice")]
-    pub basis: Option<Basis>,
-    /// Prediction in space: none, linear, cubic or auto. Default: what suits the basis.
+    pub basis: AnyBasis,
+    /// Prediction in space: none (for haar, multi and learned), linear, cubic or auto. Default: what suits the basis.
     #[serde(with = "choice::optional")]
     pub space: Option<SpatialPredictor>,
     /// Frames in a window. Default: 32, and 33 for the basis multi.
@@ -124,7 +125,7 @@ impl ConvertRequest {
         Err(Error::setting(setting, what))
     }
 
-    /// Whether samples would be coded in place, which takes a prediction, without one.
+    /// Whether no prediction is asked for, with a basis that needs one.
     fn lacks_prediction(&self) -> bool {
         self.space == Some(SpatialPredictor::Alone) && matches!(self.basis, None | Some(Basis::Samples))
     }
@@ -241,6 +242,8 @@ mod tests {
             (r#"{"scan": "a.json", "bound": {"relative": {"floor": 0}}}"#, "scan", "needs `bound`"),
             (r#"{"shard": "1/2", "bound": {"relative": {"floor": 0}}}"#, "shard", "needs `bound`"),
             (r#"{"shard": "1/2"}"#, "shard", "range of all frames"),
+            (r#"{"space": "none"}"#, "space", "takes `basis` haar"),
+            (r#"{"space": "none", "basis": "pyramid"}"#, "space", "takes `basis` haar"),
         ] {
             let error = read(json).expect("a request").check().expect_err(json);
             assert!(error.to_string().starts_with(setting) && error.to_string().contains(words), "{json}: {error}");

@@ -1,7 +1,7 @@
 //! Checks of the bytes of a file: checksums, headers and padding, without decoding.
 
 use super::CoefficientFile;
-use super::fetch::BLOCKS_TOGETHER;
+use super::coefficient_file::BLOCKS_TOGETHER;
 use rayon::prelude::*;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_format::{BlockEntry, CompletePrefix, LeafEntry};

@@ -3,8 +3,7 @@
 use crate::file::counted::Counted;
 use crate::file::decoded::DecodedBlocks;
 use crate::file::detail;
-use crate::file::fetch::BLOCKS_TOGETHER;
-use crate::file::promise;
+use crate::file::promise::{self, setting};
 use crate::remote::{self, RemoteOptions};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,6 +22,9 @@ use wavesplat_core::codec::coarse;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
 use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage};
+
+/// Blocks that are fetched together to be checked.
+pub(super) const BLOCKS_TOGETHER: usize = 32;
 
 /// An open coefficient file; several threads may read it. Clones share what is open.
 #[derive(Debug, Clone)]
@@ -448,11 +450,6 @@ impl CoefficientFile {
 /// Bytes at the end of a file of `len` bytes that likely hold its metadata and the root of its directory.
 fn tail(len: u64) -> u64 {
     (len / 512).clamp(64 << 10, 4 << 20)
-}
-
-/// The value of one of a file's settings.
-pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
-    file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
 }
 
 /// The times of a file's frames, and how they are written.

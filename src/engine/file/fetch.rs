@@ -10,9 +10,6 @@ use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_format::{BlockEntry, LeafEntry, PartEntry, Storage};
 
-/// Blocks that are fetched together to be checked.
-pub(super) const BLOCKS_TOGETHER: usize = 32;
-
 /// Windows that are fetched together at most.
 const WINDOWS_TOGETHER: usize = 256;
 

@@ -6,9 +6,9 @@
 mod counted;
 mod detail;
 pub mod promise;
-mod fetch;
 mod decoded;
 mod coefficient_file;
+mod fetch;
 mod keep;
 mod check;
 pub mod shard;
@@ -19,6 +19,7 @@ pub mod repack;
 pub mod merge;
 pub mod resume;
 
-pub use coefficient_file::{CoefficientFile, setting, time_labels};
+pub use coefficient_file::{CoefficientFile, time_labels};
 pub(crate) use decoded::DecodedBlock;
 pub use fetch::Prefetch;
+pub use promise::setting;

@@ -1,6 +1,5 @@
-//! What the metadata say about the error bound: a share of a range of values, or an error in the samples' unit.
+//! What the metadata say: their settings, and the error bound: a share of a range of values, or an error in the samples' unit.
 
-use super::setting;
 use wavesplat_core::base::sample::join_ranges;
 use wavesplat_format::{Bound, Metadata};
 
@@ -9,6 +8,11 @@ pub(crate) const UNIT_RANGE: (f64, f64) = (0.0, 1.0);
 
 /// The setting that marks a bound in the samples' unit, in contrast to a share of a given range.
 pub(crate) const MAX_ERROR: &str = "max-error";
+
+/// The value of one of a file's settings.
+pub fn setting<'a>(file: &'a Metadata, name: &str) -> Option<&'a str> {
+    file.settings.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+}
 
 /// The error that a conversion was asked to keep, in the samples' unit; none if it was asked to keep a share.
 pub fn max_error(file: &Metadata) -> Option<f64> {

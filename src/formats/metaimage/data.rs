@@ -1,17 +1,55 @@
 //! Where the samples of a MetaImage are: after the header, in another file, or in a file for each frame or slice.
 
 use super::header::MetaImageHeader;
-use super::read::MetaImageSamples;
 use crate::shared::deflated::{Compression, Deflated, StreamOffset, check_room};
+use crate::shared::directions::Placed;
 use crate::shared::pattern;
 use crate::shared::pieces::{Piece, Pieces, Stream};
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::description::AxisRole;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::Parsed;
 use wavesplat_core::source::file_header::check_size;
-use wavesplat_core::source::layout::Layout;
-use wavesplat_core::source::parts::{DataLocation, Part};
+use wavesplat_core::source::layout::{Axis, Layout, Shape};
+use wavesplat_core::source::parts::{DataLocation, Part, Stored};
+
+/// The type and layout of the samples, whichever file has them.
+pub(super) struct MetaImageSamples {
+    pub(super) axes: usize,
+    /// Voxels along its axes of space, the fastest first, as they are stored.
+    pub(super) lengths: [usize; 3],
+    pub(super) placed: Placed,
+    /// As they are when turned.
+    pub(super) shape: Shape,
+    /// The type of the stored numbers.
+    pub(super) ty: StoredType,
+    pub(super) frames: usize,
+    pub(super) components: usize,
+    /// Which of them is meant.
+    pub(super) component: usize,
+    pub(super) variable: Option<String>,
+    pub(super) big_endian: bool,
+    pub(super) compressed: bool,
+}
+
+impl MetaImageSamples {
+    /// How some frames are stored.
+    pub(super) fn stored(&self, frames: usize) -> Parsed<Stored> {
+        let components = Axis::single(self.component, self.components);
+        let voxels = self.placed.voxels(self.lengths);
+        let axes = [Axis::new(AxisRole::Frames, frames)].into_iter().chain(voxels).chain([components]);
+        Stored::new(&Layout(axes.collect()), self.ty, self.big_endian)
+    }
+
+    /// Some planes as if components were voxels beside one another.
+    pub(super) fn flat(&self, planes: usize) -> Parsed<Shape> {
+        let [x, y, _] = self.lengths;
+        let row = x.checked_mul(self.components).ok_or("a row of its size is too large")?;
+        Shape::new([row, y, planes], self.shape.sample())
+    }
+}
 
 /// The files that hold the frames, checked for their size.
 pub(super) fn parts(file: &FileBytes, header: &MetaImageHeader, samples: &MetaImageSamples) -> Result<Vec<Part>> {

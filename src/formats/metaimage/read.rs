@@ -1,6 +1,6 @@
 //! Reads MetaImage.
 
-use super::data;
+use super::data::{self, MetaImageSamples};
 use super::header::MetaImageHeader;
 use super::layout::{BIG_ENDIAN, NAME, ORIGIN, SPACING, TRANSFORM, TYPES};
 use crate::shared::component;
@@ -14,7 +14,6 @@ use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::file_header::{FileHeader, growing_head};
 use wavesplat_core::source::layout::Shape;
 use wavesplat_core::source::layout::{Axis, Layout};
-use wavesplat_core::source::parts::Stored;
 use wavesplat_core::source::{Advised, Parsed};
 
 /// Reads the header and checks the size of every data file.
@@ -42,42 +41,6 @@ fn description(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<O
     let is_plain = global.is_empty() && samples.placed.is_plain();
     let described = directions(header, samples.axes)?.description(NAME, LPS, &layout);
     Ok((!is_plain).then_some(Description { global, ..described }))
-}
-
-/// The type and layout of the samples, whichever file has them.
-pub(super) struct MetaImageSamples {
-    pub(super) axes: usize,
-    /// Voxels along its axes of space, the fastest first, as they are stored.
-    pub(super) lengths: [usize; 3],
-    pub(super) placed: Placed,
-    /// As they are when turned.
-    pub(super) shape: Shape,
-    /// The type of the stored numbers.
-    pub(super) ty: StoredType,
-    pub(super) frames: usize,
-    pub(super) components: usize,
-    /// Which of them is meant.
-    pub(super) component: usize,
-    pub(super) variable: Option<String>,
-    pub(super) big_endian: bool,
-    pub(super) compressed: bool,
-}
-
-impl MetaImageSamples {
-    /// How some frames are stored.
-    pub(super) fn stored(&self, frames: usize) -> Parsed<Stored> {
-        let components = Axis::single(self.component, self.components);
-        let voxels = self.placed.voxels(self.lengths);
-        let axes = [Axis::new(AxisRole::Frames, frames)].into_iter().chain(voxels).chain([components]);
-        Stored::new(&Layout(axes.collect()), self.ty, self.big_endian)
-    }
-
-    /// Some planes as if components were voxels beside one another.
-    pub(super) fn flat(&self, planes: usize) -> Parsed<Shape> {
-        let [x, y, _] = self.lengths;
-        let row = x.checked_mul(self.components).ok_or("a row of its size is too large")?;
-        Shape::new([row, y, planes], self.shape.sample())
-    }
 }
 
 fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImageSamples> {

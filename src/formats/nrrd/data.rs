@@ -1,20 +1,35 @@
 //! Where the samples of a NRRD are: after the header, in another file, or in several.
 
+use super::axes::Axes;
 use super::files::DataFiles;
 use super::header::NrrdHeader;
-use super::read::NrrdSamples;
 use crate::shared::deflated::{Compression, Stream, check_room};
+use crate::shared::directions::Placed;
 use crate::shared::pieces::{self, Piece, Pieces};
 use std::path::Path;
 use wavesplat_core::base::description::AxisRole;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::Parsed;
 use wavesplat_core::source::file_header::check_size;
-use wavesplat_core::source::layout::Layout;
+use wavesplat_core::source::layout::{Layout, Shape};
 use wavesplat_core::source::parts::{DataLocation, Part, Stored};
 
 const PIECE: usize = 64 << 10; // bytes read at a time when lines are counted
+
+/// The samples that are meant.
+pub(super) struct NrrdSamples {
+    pub(super) axes: Axes,
+    pub(super) layout: Layout,
+    pub(super) shape: Shape,
+    /// The type of the stored numbers.
+    pub(super) ty: StoredType,
+    pub(super) big_endian: bool,
+    pub(super) gzip: bool,
+    pub(super) placed: Placed,
+    pub(super) variable: Option<String>,
+}
 
 /// Bytes and lines to leave out before the samples of each data file.
 struct Skip {

@@ -1,7 +1,7 @@
 //! Reads NRRD.
 
 use super::axes::Axes;
-use super::data;
+use super::data::{self, NrrdSamples};
 use super::header::NrrdHeader;
 use super::layout::{NAME, TYPES};
 use crate::shared::component;
@@ -39,19 +39,6 @@ fn description(header: &NrrdHeader, array: &NrrdSamples) -> Parsed<Option<Descri
     let text = |(name, value): &(String, String)| Attribute { name: name.clone(), value: Values::text(value) };
     let described = array.axes.placed(header)?.description(NAME, space, &array.layout);
     Ok((!is_plain).then(|| Description { global: header.keys.iter().map(text).collect(), ..described }))
-}
-
-/// The samples that are meant.
-pub(super) struct NrrdSamples {
-    pub(super) axes: Axes,
-    pub(super) layout: Layout,
-    pub(super) shape: Shape,
-    /// The type of the stored numbers.
-    pub(super) ty: StoredType,
-    pub(super) big_endian: bool,
-    pub(super) gzip: bool,
-    pub(super) placed: Placed,
-    pub(super) variable: Option<String>,
 }
 
 impl NrrdSamples {

@@ -2,6 +2,7 @@
 
 use super::pages::{Page, Pages};
 use super::stack::Stack;
+use super::{imagej, ome};
 use crate::shared::component;
 use std::fmt;
 use std::ops::Range;
@@ -27,7 +28,7 @@ pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader>
     let (page, said) = (pages.page()?, pages.description());
     let count = pages.count(&page)?;
     let refused = |e: String| Error::input(path, e);
-    let stack = Stack::parse(&said, count, pages.pixels_per_unit()).map_err(refused)?;
+    let stack = stack(&said, count, pages.pixels_per_unit()).map_err(refused)?;
     let (shape, channel, variable) = shape(&stack, &page, options).map_err(|e| Error::input(path, e))?;
     check_room(count, &page, state.len).map_err(refused)?;
     check_chunks(path, &page, options.memory)?;
@@ -43,6 +44,21 @@ pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader>
 }
 
 /// The voxels of a frame, the channel that is meant, and its name.
+/// The pages as the first one describes them. Without a description, they are one frame.
+pub(super) fn stack(said: &str, pages: usize, pixels_per_unit: [Option<f64>; 2]) -> Parsed<Stack> {
+    let stack = match said {
+        said if ome::is_ome(said) => ome::parse(said)?,
+        said if said.starts_with(imagej::START) => imagej::parse(said, pages, pixels_per_unit)?,
+        _ => Stack::new(['Z', 'C', 'T'], [pages, 1, 1])?,
+    };
+    let all = [stack.frames, stack.planes, stack.channels].into_iter().try_fold(1_usize, usize::checked_mul);
+    if all == Some(pages) {
+        return Ok(stack);
+    }
+    let Stack { frames, planes, channels, .. } = stack;
+    Err(format!("has {pages} page(s), but says {planes} plane(s) of {channels} channel(s) in {frames} frame(s)"))
+}
+
 fn shape(stack: &Stack, page: &Page, options: &OpenOptions) -> Advised<(Shape, usize, Option<String>)> {
     let (channel, variable) = component::only_array(None, stack.channels, options.variable.as_deref())?;
     let shape = Shape::new([page.dims[0], page.dims[1], stack.planes], page.ty.sample())?;

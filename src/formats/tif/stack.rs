@@ -1,6 +1,5 @@
 //! How the pages of a file make up frames.
 
-use super::{imagej, ome};
 use wavesplat_core::source::Parsed;
 
 /// Pages as planes of frames.
@@ -20,21 +19,6 @@ pub(super) struct Stack {
 }
 
 impl Stack {
-    /// From the first page's description of `pages` pages. Without a description, they are one frame.
-    pub(super) fn parse(said: &str, pages: usize, pixels_per_unit: [Option<f64>; 2]) -> Parsed<Self> {
-        let stack = match said {
-            said if ome::is_ome(said) => ome::parse(said)?,
-            said if said.starts_with(imagej::START) => imagej::parse(said, pages, pixels_per_unit)?,
-            _ => Self::new(['Z', 'C', 'T'], [pages, 1, 1])?,
-        };
-        let all = [stack.frames, stack.planes, stack.channels].into_iter().try_fold(1_usize, usize::checked_mul);
-        if all == Some(pages) {
-            return Ok(stack);
-        }
-        let Self { frames, planes, channels, .. } = stack;
-        Err(format!("has {pages} page(s), but says {planes} plane(s) of {channels} channel(s) in {frames} frame(s)"))
-    }
-
     /// Pages in an order of axes, the fastest first: `Z`, `C` and `T`, with their lengths.
     pub(super) fn new(order: [char; 3], lengths: [usize; 3]) -> Parsed<Self> {
         let (mut step, mut found) = (1_usize, [(0, 0); 3]);

@@ -6,12 +6,12 @@
 //! To add an option of pictures:
 //!
 //! 1. Add its field and default to [`PictureRequest`] (`request.rs`), and say there which fields exclude it.
-//! 2. Add the option to `cli/render/groups.rs`, and set the field there.
+//! 2. Add the option to a group in `cli/render/groups.rs`, and the field to `Cli::request` (`cli/render/args.rs`).
 //! 3. Use the field in the step of `plan` that it concerns: the steps are listed in `plan/mod.rs`.
 //! 4. Test it in `tests/cli`, and name it in `tools/guide/pictures.md`. Python takes the field as a keyword.
 //!
 //! If partial sums must agree on it, add it to `PictureSetup` (`engine/render/partial/head.rs`); if a picture's text must
-//! tell it, to `plan/provenance.rs`; if the viewer changes it, to `view_request.rs` and the page (`engine/render/page/web`).
+//! tell it, to `plan/provenance.rs`; if the viewer changes it, to `FIELDS` in `view_request.rs`, and to `request` in `engine/render/page/web/live.js`.
 //!
 //! To add a mode, that is, another kind of picture:
 //!
@@ -19,7 +19,8 @@
 //!    `Mode` in `engine/render/mod.rs`.
 //! 2. Add its name to [`values::ModeName`], and make the variant from the request in `plan/modes.rs`. The compiler then
 //!    lists the steps of `plan` that must know it.
-//! 3. For the viewer, add it to `ViewMode` (`view_request.rs`) and to `controls.html`.
+//! 3. For the viewer, add it to `controls.html` and `steer.js`, and its colours to `coloursOf` in `live.js`
+//!    (`engine/render/page/web`).
 
 mod reporter;
 pub mod values;

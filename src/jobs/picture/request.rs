@@ -222,11 +222,12 @@ impl PictureRequest {
             let alone = Map::from_iter([(name.clone(), value.clone())]);
             serde_json::from_value::<Self>(alone.into()).map_err(|e| wrong(format!("`{name}`: {e}")))?;
         }
-        let own = serde_json::to_value(self).map_err(wrong)?;
-        let mut fields: Map<String, Value> = serde_json::from_value(own).map_err(wrong)?;
+        let mut fields = self.fields()?;
         fields.extend(given.clone());
         let changed: Self = serde_json::from_value(fields.into()).map_err(wrong)?;
-        Ok(Self { output: self.output.clone(), certify: self.certify, ..changed })
+        // JSON has no NaN.
+        let missing_value = changed.missing_value.or(self.missing_value);
+        Ok(Self { output: self.output.clone(), certify: self.certify, missing_value, ..changed })
     }
 
     /// An error unless all numbers are within their limits.
@@ -239,10 +240,13 @@ impl PictureRequest {
     }
 
     /// The options of `wavesplat-render` that ask for the same.
-    pub fn words(&self) -> Vec<String> {
-        let usual = Self::default().fields();
-        let given = self.fields().into_iter().filter(|(name, value)| usual.get(name) != Some(value));
-        given.flat_map(|(name, value)| words_of(&name, &value)).collect()
+    ///
+    /// # Errors
+    /// Paths that are no Unicode.
+    pub fn words(&self) -> Result<Vec<String>> {
+        let usual = Self::default().fields()?;
+        let given = self.fields()?.into_iter().filter(|(name, value)| usual.get(name) != Some(value));
+        Ok(given.flat_map(|(name, value)| words_of(&name, &value)).collect())
     }
 
     /// Whether time series are asked for instead of pictures.
@@ -260,16 +264,13 @@ impl PictureRequest {
         self.output == Path::new(STANDARD)
     }
 
-    fn fields(&self) -> Map<String, Value> {
-        match serde_json::to_value(self) {
-            Ok(Value::Object(fields)) => fields,
-            _ => Map::new(),
-        }
+    fn fields(&self) -> Result<Map<String, Value>> {
+        serde_json::to_value(self).and_then(serde_json::from_value).map_err(wrong)
     }
 }
 
 /// The error of a text that is no request.
-fn wrong(what: impl Display) -> Error {
+pub(super) fn wrong(what: impl Display) -> Error {
     Error::setting("request", what.to_string())
 }
 
@@ -309,7 +310,8 @@ const FINISH: [&str; 12] = [
 
 /// Whether a request has a field of this name.
 pub fn is_field(name: &str) -> bool {
-    static FIELDS: LazyLock<Map<String, Value>> = LazyLock::new(|| PictureRequest::default().fields());
+    static FIELDS: LazyLock<Map<String, Value>> =
+        LazyLock::new(|| PictureRequest::default().fields().unwrap_or_default());
     FIELDS.contains_key(name)
 }
 
@@ -378,7 +380,7 @@ mod tests {
             "view=180,90",
             "view=10,-20.5",
         ];
-        let mut all = request.words();
+        let mut all = request.words().expect("plain paths");
         all.sort();
         let mut expected = words.map(|word| ["--", word].concat());
         expected.sort();

@@ -1,9 +1,9 @@
 //! A request of the viewer's page. The page is not trusted: it may set a few fields, and can name no file.
 
-use super::request::PictureRequest;
+use super::request::{PictureRequest, wrong};
 use serde::Deserialize;
 use serde_json::{Map, Value};
-use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::error::Result;
 use wavesplat_core::colour::NAMES;
 
 /// The fields that a page may set.
@@ -30,8 +30,10 @@ const FIELDS: [&str; 18] = [
 
 /// Most pixels along a side of a picture.
 const MOST_PIXELS: usize = 4096;
-/// Most surfaces, slices, opacities, views or ranges of frames.
-const MOST_PLACES: usize = 16;
+/// Most surfaces, slices, opacities or ranges of frames.
+const MOST_ITEMS: usize = 16;
+/// Longest text of a field, in bytes.
+const MOST_LETTERS: usize = 1000;
 
 /// A request for pictures.
 #[derive(Debug, Clone, Deserialize)]
@@ -66,25 +68,25 @@ impl ViewRequest {
     /// The request for pictures that draws this, with the other settings of `base`.
     ///
     /// # Errors
-    /// A base that is no JSON, such as one with paths that are no Unicode.
+    /// A base with paths that are no Unicode.
     pub fn applied_to(&self, base: &PictureRequest) -> Result<PictureRequest> {
         Ok(PictureRequest { certify: self.certify, ..base.with(&self.look)? })
     }
 }
 
 fn check_field(name: &str, value: &Value) -> Result<()> {
-    let places = value.as_array().map_or(0, Vec::len).max(value.as_str().map_or(0, |text| text.split(',').count()));
-    let is_colours = ["colormap", "transfer_function"].contains(&name);
-    match () {
-        () if !FIELDS.contains(&name) => Err(wrong(format!("unknown field `{name}`"))),
-        () if places > MOST_PLACES => Err(wrong(format!("{name}: at most {MOST_PLACES} places"))),
-        () if is_colours && !value.as_str().is_some_and(|map| NAMES.contains(&map)) => {
-            Err(wrong(format!("{name}: takes one of {}", NAMES.join(" "))))
-        }
-        () => Ok(()),
+    let texts = || value.as_array().into_iter().flatten().chain([value]).filter_map(Value::as_str);
+    let items = texts().map(|text| text.split(',').count()).sum::<usize>();
+    let most = if name == "view" { 2 } else { MOST_ITEMS }; // the angles of a view
+    if !FIELDS.contains(&name) {
+        return Err(wrong(format!("unknown field `{name}`")));
     }
-}
-
-fn wrong(what: String) -> Error {
-    Error::setting("request", what)
+    if items > most || texts().any(|text| text.len() > MOST_LETTERS) {
+        return Err(wrong(format!("{name}: takes at most {most} parts and {MOST_LETTERS} letters")));
+    }
+    let is_colours = ["colormap", "transfer_function"].contains(&name);
+    if is_colours && !value.as_str().is_some_and(|map| NAMES.contains(&map)) {
+        return Err(wrong(format!("{name}: takes one of {}", NAMES.join(" "))));
+    }
+    Ok(())
 }

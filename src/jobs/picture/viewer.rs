@@ -188,7 +188,7 @@ impl ViewerSession {
     /// The file of the pictures of a request, made in memory; ffmpeg alone needs a file for a movie.
     pub fn save(&self, view: &ViewRequest, saved: Saved, work: &CancelToken) -> Result<Vec<u8>> {
         if saved != Saved::Movie {
-            let (out, bytes) = Output::to_memory(saved.name());
+            let (out, bytes) = Output::to_memory(saved.name(), self.session.memory);
             self.write(view, saved, out, work)?;
             return Ok(bytes.try_recv().unwrap_or_default());
         }
@@ -217,7 +217,7 @@ impl ViewerSession {
         let request = PictureRequest { certify: false, ..view.applied_to(&self.base)? };
         let inputs = self.session.paths().iter().map(|path| path.to_string_lossy().into_owned());
         let words =
-            request.words().into_iter().chain(view.certify.then(|| format!("--{}=error.npy", option("error_image"))));
+            request.words()?.into_iter().chain(view.certify.then(|| format!("--{}=error.npy", option("error_image"))));
         let all = inputs.chain(self.input_words.iter().cloned()).chain(words).chain(["-o".into(), saved.name().into()]);
         Ok(all.fold("wavesplat-render".into(), |line, word| line + " " + &quoted(&word)))
     }

@@ -19,19 +19,19 @@ const CASES: [(&str, &str); 18] = [
     ("verify", "wavesplat verify FILE"),
     ("verify, against frames", "wavesplat verify FILE --against FRAMES"),
     ("extract", "wavesplat extract FILE -o OUT.npy"),
-    ("extract one frame", "wavesplat extract FILE -o OUT.npy --frames 5"),
+    ("extract one frame", "wavesplat extract FILE -o OUT.npy --frames 0"),
     ("projections", "wavesplat-render FILE -o OUT.npy --range RANGE"),
     ("projections, fast", "wavesplat-render FILE -o OUT.npy --range RANGE --fast"),
     ("projections along an axis", "wavesplat-render FILE -o OUT.npy --range RANGE --view 0,0"),
     ("projections of frames", "wavesplat-render FRAMES -o OUT.npy --range RANGE --method direct"),
-    ("one projection", "wavesplat-render FILE -o OUT.npy --range RANGE --frames 5"),
-    ("one picture, all defaults", "wavesplat-render FILE -o OUT.png --frames 5"),
+    ("one projection", "wavesplat-render FILE -o OUT.npy --range RANGE --frames 0"),
+    ("one picture, all defaults", "wavesplat-render FILE -o OUT.png --frames 0"),
     ("composites", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite"),
-    ("one composite", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite --frames 5"),
+    ("one composite", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite --frames 0"),
     ("largest values", "wavesplat-render FILE -o OUT.npy --range RANGE --mode mip"),
     ("surfaces", "wavesplat-render FILE -o OUT.npy --range RANGE --mode iso"),
-    ("one surface", "wavesplat-render FILE -o OUT.npy --range RANGE --mode iso --frames 5"),
-    ("slices", "wavesplat-render FILE -o OUT.npy --range RANGE --mode slice"),
+    ("one surface", "wavesplat-render FILE -o OUT.npy --range RANGE --mode iso --frames 0"),
+    ("slices", "wavesplat-render FILE -o OUT.npy --range RANGE --slice x=0.5,y=0.5,z=0.5"),
 ];
 
 /// What to measure, with what, and where results go.
@@ -71,17 +71,13 @@ pub fn run(config: &Config, say: &mut dyn FnMut(&str)) -> Result<String> {
     }
     let work = config.output.join("speed-work");
     fs::create_dir_all(&work).map_err(|e| Error::io(&work, "creating the folder", e))?;
-    let mut text = head(config);
-    for input in &config.inputs {
-        text += &Archive { config, work: &work, data: Data::of(input.clone())? }.rows(say)?;
-    }
-    for kind in &config.kinds {
-        let made = Synth::f32(*kind, config.dims).write_npy(&work)?;
-        text += &Archive { config, work: &work, data: Data::of(made)? }.rows(say)?;
+    let (mut text, path) = (head(config), config.output.join("speed.md"));
+    let made = |kind: &Kind| Synth::f32(*kind, config.dims).write_npy(&work);
+    for archive in config.inputs.iter().cloned().map(Ok).chain(config.kinds.iter().map(made)) {
+        text += &Archive { config, work: &work, data: Data::of(archive?)? }.rows(say)?;
+        fs::write(&path, &text).map_err(|e| Error::io(&path, "writing", e))?; // an interrupted run leaves what it has
     }
     fs::remove_dir_all(&work).map_err(|e| Error::io(&work, "removing", e))?;
-    let path = config.output.join("speed.md");
-    fs::write(&path, &text).map_err(|e| Error::io(&path, "writing", e))?;
     Ok(text)
 }
 
@@ -95,7 +91,7 @@ fn head(config: &Config) -> String {
          sample within {tolerance:e} of the value range. Pictures have {size}x{size} pixels.\n"
     );
     text += match against {
-        Some(_) => "| data | command | other build, s | this build, s | ratio |\n|---|---|--:|--:|--:|\n",
+        Some(_) => "| data | command | other build, s | this build, s | this / other |\n|---|---|--:|--:|--:|\n",
         None => "| data | command | s |\n|---|---|--:|\n",
     };
     text
@@ -143,18 +139,19 @@ impl Archive<'_> {
         let name = words.next().unwrap_or_default();
         let program = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
         let mut command = Command::new(&program);
-        command.args(words.map(|word| self.word(word)));
-        command.args(["--quiet", "--threads", &self.config.threads.to_string()]);
-        if name == "wavesplat-render" {
-            command.arg(format!("--size={0}x{0}", self.config.size));
-        }
-        if line.contains(" -o ") {
-            command.arg("--force");
-        }
+        let mut words: Vec<String> = words.map(|word| self.word(word)).collect();
+        words.extend(["--quiet".into(), format!("--threads={}", self.config.threads)]);
+        words.extend((name == "wavesplat-render").then(|| format!("--size={0}x{0}", self.config.size)));
+        words.extend(line.contains(" -o ").then(|| "--force".into()));
+        command.args(&words);
         let clock = Instant::now();
         let status = command.stdin(Stdio::null()).stdout(Stdio::null()).status();
         let (seconds, status) = (clock.elapsed().as_secs_f64(), status.map_err(|e| Error::io(&program, "running", e))?);
-        if status.success() { Ok(seconds) } else { Err(Error::input(program, format!("{line} failed ({status})"))) }
+        if status.success() {
+            Ok(seconds)
+        } else {
+            Err(Error::input(program, format!("{} failed ({status})", words.join(" "))))
+        }
     }
 
     /// A word of a command, with this archive's names and numbers.

@@ -3,7 +3,6 @@
 mod given;
 mod options;
 
-use super::several;
 use crate::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
 use clap::{Arg, Args, Command};
 pub(crate) use options::ConvertArgs;
@@ -20,15 +19,8 @@ use wavesplat_engine::file::resume::{self, IfUnfinished};
 use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::colours_of_source;
 
+/// Converts one variable.
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
-    args.common.start()?;
-    match several::commands(args)? {
-        Some(commands) => commands.iter().try_for_each(run_one),
-        None => run_one(args),
-    }
-}
-
-fn run_one(args: &ConvertArgs) -> Result<()> {
     if let Some(file) = args.input.coefficients(&args.inputs, &RemoteArgs::default())? {
         return args.repack(&file);
     }

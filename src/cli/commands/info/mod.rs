@@ -39,7 +39,7 @@ pub(crate) struct InfoArgs {
     common: CommonArgs,
 }
 
-/// Reads a tolerance. An input that follows the option is a mistake that people make.
+/// Reads a tolerance. Where an input follows the option, the message says where the option goes.
 fn tolerance(text: &str) -> std::result::Result<f64, String> {
     share(text).map_err(|what| format!("{what}. For a table of five tolerances, write --estimate after the inputs"))
 }

@@ -47,7 +47,8 @@ pub struct PictureSetup {
     pub kernel: Kernel,
     /// The requested splat error.
     pub splat_error: f64,
-    /// Whether the splat error is an estimate.
+    /// Whether the splat error is an estimate. Files of the first version call it `quick`.
+    #[serde(rename = "quick")]
     pub fast: bool,
     /// The tolerance of pictures as a share of the range, and in the unit of the samples.
     pub tolerance: Option<(f64, f64)>,
@@ -179,6 +180,7 @@ impl PictureSetup {
             "kernel" => "sigma or tau".into(),
             "paired" => "frames of views".into(),
             "direct" => "method".into(),
+            "quick" => "fast".into(),
             key => key.replace('_', " "),
         };
         own.iter().find(|(key, value)| other.get(*key).unwrap_or(&Value::Null) != *value).map(|(key, _)| named(key))

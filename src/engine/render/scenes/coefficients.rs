@@ -181,8 +181,8 @@ impl<'a> CoefficientBatch<'a> {
     }
 
     /// The rule that leaves out as much as the allowed error permits.
-    fn rule(&self, allowed: f64, limited: Limit, region: &Region) -> Result<Rule> {
-        let (Limit::Expected, [view, ..]) = (limited, self.views) else { return Ok(Rule::Within(allowed)) };
+    fn rule(&self, allowed: f64, error: Limit, region: &Region) -> Result<Rule> {
+        let (Limit::Expected, [view, ..]) = (error, self.views) else { return Ok(Rule::Within(allowed)) };
         let mut cheapest = RateAllocator::new(&self.selector);
         for entries in self.file.entries(self.window, self.channel, region) {
             entries?.iter().for_each(|entry| cheapest.add(&self.view_of(entry, Some(view))));

@@ -177,6 +177,8 @@ pub(in crate::render) trait Blend: Sync {
     const NOTHING: Self::Cell;
     /// The limit of a group before the first slice.
     const OPEN: f32;
+    /// The limit of a group after all its rays have ended.
+    const OVER: f32 = 0.0;
     /// Whether units depend on a value near those of the frame.
     const CENTRED: bool = false;
     /// Where the density is less, there is nothing.
@@ -209,9 +211,6 @@ pub(in crate::render) trait Blend: Sync {
     fn is_closed(limit: f32) -> bool {
         limit < CLOSED
     }
-
-    /// The limit of a group after all its rays have ended.
-    const OVER: f32 = 0.0;
 
     /// Adds the live groups of a row behind the slices before, and updates their limits.
     fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]);

@@ -43,7 +43,7 @@ impl SplatBackend {
             Quantity::Emission => slices * slice.of_waves,
         };
         let lattice = || match config.fast {
-            true => Lattice::quick(view, estimated),
+            true => Lattice::fast(view, estimated),
             false => Lattice::within(error, view, stated),
         };
         match (!config.certify).then(lattice).flatten() {

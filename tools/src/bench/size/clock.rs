@@ -1,7 +1,7 @@
 //! Processor time of this process on one core, over all its threads. Busy neighbours disturb this time least.
 
 /// Keeps this process and the library's workers on one core. Call before any thread starts.
-pub(in crate::bench) fn stay_on_one_core() {
+pub(super) fn stay_on_one_core() {
     work_with(1);
     #[cfg(target_os = "linux")]
     if let Ok(allowed) = rustix::thread::sched_getaffinity(None)
@@ -14,7 +14,7 @@ pub(in crate::bench) fn stay_on_one_core() {
 }
 
 /// Gives the library this many workers. Call before any thread starts.
-pub(in crate::bench) fn work_with(threads: usize) {
+fn work_with(threads: usize) {
     // If a pool exists, this runs in a test, which does not judge times.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
 }

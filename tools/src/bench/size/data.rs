@@ -62,7 +62,7 @@ impl Subject {
     }
 
     /// Writes the archive into a folder.
-    pub(in crate::bench) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
+    pub(super) fn make(self, folder: &Path, small: bool, peers: Option<&Peers>) -> Result<PathBuf> {
         let path = folder.join(format!("{}.npy", self.name()));
         let dims = if small { [16, 12, 10, 8] } else { [64, 64, 64, 32] };
         match (self.synth(), peers) {
@@ -114,7 +114,7 @@ impl Data {
     }
 
     /// Its name and size in words.
-    pub(in crate::bench) fn in_words(&self) -> String {
+    pub(super) fn in_words(&self) -> String {
         let [x, y, z] = self.dims;
         format!("*{}*: {x}x{y}x{z} voxels, {} frames, {}", self.name, self.frames, self.samples)
     }

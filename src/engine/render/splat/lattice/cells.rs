@@ -1,11 +1,13 @@
 //! The cells (eq 35) of a band of a picture, with planes of sums.
 
-use super::filtered::TOGETHER;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use wavesplat_core::base::vectors::dispatch;
 use wavesplat_core::base::zeroed::Zeroed;
 use wavesplat_core::codec::real::Real;
+
+/// The largest number of planes in a group: their sums stay in a register.
+pub(super) const TOGETHER: usize = 16;
 
 /// A rectangle of cells with planes of sums.
 ///

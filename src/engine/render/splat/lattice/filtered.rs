@@ -1,6 +1,6 @@
 //! The cells of a band after the prefilter (eq 36), with planes side by side.
 
-use super::cells::{Aligned, Cells, LINE, PlaneSums, Rectangle};
+use super::cells::{Aligned, Cells, LINE, PlaneSums, Rectangle, TOGETHER};
 use super::prefilter::{HALF, Taps};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -42,9 +42,6 @@ pub(super) struct Group {
     /// For each plane, the rows of cells with sums and their columns: of row v, from first to last.
     spans: Vec<Vec<Range<usize>>>,
 }
-
-/// The largest number of planes in a group: their sums stay in a register.
-pub(super) const TOGETHER: usize = 16;
 
 /// The places in a cell for `planes` planes in total.
 pub(super) fn places(planes: usize) -> usize {

@@ -4,7 +4,8 @@
 //! first, then these sums along the row ([`TwoPasses`]). Otherwise each pixel sums all cells around it ([`OnePass`]).
 
 use super::bundle::{Bundles, TilePlane};
-use super::filtered::{FilteredCells, TOGETHER, Window};
+use super::cells::TOGETHER;
+use super::filtered::{FilteredCells, Window};
 use super::one_pass::OnePass;
 use super::picture::Lattice;
 use super::two_passes::TwoPasses;

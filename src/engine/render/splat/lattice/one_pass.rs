@@ -1,7 +1,7 @@
 //! Gathers pixels in one pass: each sums all cells around it (eq 37).
 
 use super::bundle::{Bundle, weighted};
-use super::filtered::TOGETHER;
+use super::cells::TOGETHER;
 use super::kernel::{Kernel, Weights};
 use super::picture::Lattice;
 use wavesplat_core::base::vectors::dispatch;

@@ -98,7 +98,7 @@ impl Lattice {
 
     /// The fastest lattice, whose error is only estimated: one cell a voxel. `estimated` gives the estimate for the
     /// picture from the error of a slice.
-    pub(in crate::render) fn quick(
+    pub(in crate::render) fn fast(
         view: &SplattedView<'_>,
         estimated: impl Fn(SliceError) -> f64,
     ) -> Option<(Self, Method)> {

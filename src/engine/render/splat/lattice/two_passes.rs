@@ -2,7 +2,8 @@
 //! then these sums along the row.
 
 use super::bundle::{Bundle, Bundles, weighted};
-use super::filtered::{TOGETHER, Window};
+use super::cells::TOGETHER;
+use super::filtered::Window;
 use super::product::Product;
 use crate::render::splat::tile_rect::TileRect;
 use std::ops::Range;
