@@ -281,6 +281,7 @@ fn a_looser_tolerance_reads_less_of_colours_and_keeps_to_it() {
 }
 
 #[test]
+#[ignore = "exhaustive"]
 fn neither_threads_nor_memory_change_a_bit_of_coloured_pictures() {
     let grid = Grid::unit([20, 18, 16]);
     let mut samples = field(&grid, 19, 3);

@@ -234,6 +234,7 @@ fn some_frames_from_coefficients_equal_those_of_a_full_rendering() {
 }
 
 #[test]
+#[ignore = "exhaustive"]
 fn memory_changes_no_bit_of_a_picture_from_coefficients() {
     let grid = Grid::unit([20, 18, 16]);
     let mut samples = field(&grid, FRAMES, 3);

@@ -110,6 +110,7 @@ fn consecutive(place: u64) -> u32 {
 }
 
 #[test]
+#[ignore = "exhaustive"]
 fn every_pattern_of_32_bits_comes_back_within_the_bound() {
     let started = Instant::now();
     let chunk = |first| check(&patterns(first..first + CHUNK, consecutive), Basis::Haar, 1);

@@ -90,16 +90,27 @@ const DIRECTIONS: [(f64, f64); 8] = [
 
 #[test]
 fn frames_on_a_lattice_keep_the_error_that_they_state() {
+    assert!(frames_keep_their_error(&DIRECTIONS[3..6]) >= 12);
+}
+
+#[test]
+#[ignore = "exhaustive"]
+fn frames_on_a_lattice_keep_the_error_that_they_state_in_every_direction() {
+    assert!(frames_keep_their_error(&DIRECTIONS) >= 36);
+}
+
+/// How many pictures were splatted on a lattice.
+fn frames_keep_their_error(directions: &[(f64, f64)]) -> usize {
     let mut found = 0;
     let grid = Grid { dims: [33, 37, 35], spacing: [1.0, 1.0, 0.8], origin: [5.0, 0.0, -3.0] };
     let mut samples = field(&grid, 2, 3);
     samples.iter_mut().for_each(|v| *v += 20.0);
     let largest = (largest(&samples), span(&samples));
-    for (n, (azimuth, elevation)) in DIRECTIONS.into_iter().enumerate() {
+    for (n, (azimuth, elevation)) in directions.iter().copied().enumerate() {
         let view = View { scale: Some(3.0), roll: 15.0 * (n % 3) as f64, ..view(azimuth, elevation, [70, 65]) };
         let tau = [0.0, 0.03][n % 2];
         let mut memory = archive(grid, SampleType::F64, &samples);
-        let region = (n == 5).then_some(Region { start: [0, 2, 1], ..grid.whole() });
+        let region = (n == 2).then_some(Region { start: [0, 2, 1], ..grid.whole() });
         let plain = RenderConfig { region, ..looking(view, tau, Quantity::Emission, &grid, 2) };
         let seen = truth(&grid, &plain, 3.0, &vec![0.0; grid.whole().voxels()], None);
         for splat_error in [2e-2, 1e-3, 3e-5] {
@@ -122,7 +133,7 @@ fn frames_on_a_lattice_keep_the_error_that_they_state() {
         found += usize::from(report.views[0].method == "lattice");
         assert!(means.iter().all(|v| v.is_nan() || (v - 3.0).abs() < 1e-5), "means of a constant");
     }
-    assert!(found >= 36, "{found} were splatted on a lattice");
+    found
 }
 
 /// The worst data there are for a pixel have the sign of each voxel's error. Every voxel alone gives these errors.

@@ -5,7 +5,7 @@ use crate::common::exact::Limit;
 use crate::common::memory::Memory;
 use crate::common::samples::{TYPES, numbers};
 use crate::common::series::{KINDS, Mask, volume};
-use crate::common::{BASES, extracted, settings, stored, tried};
+use crate::common::{BASES, cases, extracted, settings, stored, tried};
 use proptest::prelude::*;
 use std::path::Path;
 use std::time::Instant;
@@ -70,7 +70,7 @@ fn no_series_is_off_by_more_than_the_error_in_its_unit() {
         let mut memory = Memory::new(Grid::unit(DIMS), ty, bytes.clone());
         check(&mut memory, &bytes, ty, &config(BASES[basis], bound, ERRORS[error] * share))
     });
-    tried(series, 200_000, started);
+    tried(series, cases(160_000), started);
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod random;
 use crate::common::memory::Memory;
 use crate::common::samples::numbers;
 use crate::common::views::{largest, of_reference, rounding, truth};
-use crate::common::{rendered, report, stored, times};
+use crate::common::{cases, rendered, report, stored};
 use crate::reference::camera::project;
 use crate::reference::splat::{BACKGROUND, Images, footprint};
 use random::{Limits, scene};
@@ -191,10 +191,10 @@ impl Reference {
     }
 }
 
-/// Checks this many scenes times [`times`]. Reports the failing scenes at the end.
+/// Checks some of so many scenes: see [`cases`]. Reports the failing scenes at the end.
 fn check_all(limits: &Limits, count: u64) {
     let (started, mut all, mut failed) = (Instant::now(), Compared::default(), Vec::new());
-    let count = count * times() as u64;
+    let count = cases(count as usize) as u64;
     for seed in 0..count {
         let scene = scene(limits, seed);
         match std::panic::catch_unwind(|| scene.check()) {
