@@ -8,7 +8,6 @@ use crate::header::{Features, HEADER};
 use crate::leaf::{LeafEntry, check_window, leaves_of};
 use crate::limits::{MAX_METADATA, MAX_PARTS, align};
 use crate::metadata::Metadata;
-use crate::pyramid::check_packing;
 use crate::reader::read_header;
 use crate::section::{SectionExtent, SectionId, decompress, section_at};
 use crate::structure::check_padding;
@@ -92,7 +91,7 @@ impl CompletePrefix {
         let (section, at) = (SectionId::WindowEnd(number), scan.pad(storage)?);
         let (extent, end) = plain_at(storage, self.id, section, at, WINDOW_END)?;
         let checked = WindowRecord::parse(&record)
-            .and_then(|record| check_packing(&record.window, self.features.packing).map(|()| record))
+            .and_then(|record| record.window.check_packing(self.features.packing).map(|()| record))
             .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
             .and_then(|()| check_window(&self.metadata, number, &scan.leaves, self.end))
             .and_then(|end| ensure(end == extent.end(), || "not at the end of its window".into()));

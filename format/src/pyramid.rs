@@ -8,7 +8,6 @@
 
 use crate::bytes::{ParseResult, ensure};
 use crate::codes::sparse::CodeBox;
-use crate::window::Window;
 use bincode::de::Decoder;
 use bincode::enc::Encoder;
 use bincode::error::{DecodeError, EncodeError};
@@ -52,12 +51,6 @@ pub enum Packing {
     /// code: version 1.1.
     #[default]
     Nested,
-}
-
-/// Checks that the file's header announces how the codes of a window are packed.
-pub(crate) fn check_packing(window: &Window, announced: Packing) -> ParseResult {
-    let known = announced == Packing::Nested || window.packing() == Packing::Flat;
-    ensure(known, || "a window with nested parts, which the header does not announce".into())
 }
 
 /// A pyramid over the blocks of a window.

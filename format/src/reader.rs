@@ -14,7 +14,6 @@ use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
-use crate::pyramid::check_packing;
 use crate::section::{FRAME, SectionId, decompress, read_section};
 use crate::{Error, Result, Storage};
 
@@ -46,7 +45,7 @@ impl<S: Storage> Reader<S> {
         storage.fetch(std::slice::from_ref(&(footer.metadata.offset..footer.total)))?;
         let metadata = read_metadata(&storage, &footer)?;
         let features = header.features();
-        let packed = metadata.windows.iter().try_for_each(|window| check_packing(window, features.packing));
+        let packed = metadata.windows.iter().try_for_each(|window| window.check_packing(features.packing));
         packed.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
         check_announced(&header, &footer)?;
         let leaves = read_root(&storage, &footer, &metadata)?;

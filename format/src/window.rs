@@ -211,6 +211,12 @@ impl Window {
         self.pyramid.as_ref().map_or(Packing::Flat, |pyramid| pyramid.packing)
     }
 
+    /// Checks that the file's header announces how the codes are packed.
+    pub(crate) fn check_packing(&self, announced: Packing) -> ParseResult {
+        let known = announced == Packing::Nested || self.packing() == Packing::Flat;
+        ensure(known, || "a window with nested parts, which the header does not announce".into())
+    }
+
     /// Number of level parts that a block can have.
     pub fn parts(&self) -> usize {
         if self.pyramid.is_some() { Pyramid::PARTS.into() } else { self.levels.len() }

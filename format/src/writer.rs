@@ -11,7 +11,6 @@ use crate::leaf::{LEAF_ENTRY, LeafEntry, check_window};
 use crate::limits::{ALIGN, BLOCKS_PER_LEAF, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::prefix::CompletePrefix;
-use crate::pyramid::check_packing;
 use crate::section::{SectionExtent, SectionId, compress_directory, frame};
 use crate::window::{WindowEnd, WindowRecord};
 use crate::{Error, Result};
@@ -128,7 +127,7 @@ impl<W: Write> Writer<W> {
         let next = WindowRecord::parse(&bytes).and_then(|record| {
             let next = self.window.is_none() && record.number as usize == self.metadata.windows.len();
             ensure(next, || format!("window {} out of order", record.number))?;
-            check_packing(&record.window, self.features.packing)
+            record.window.check_packing(self.features.packing)
         });
         next.map_err(Error::Invalid)?;
         self.count_record(bytes.len())?;
