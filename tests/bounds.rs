@@ -254,7 +254,7 @@ pub(crate) fn search<S: Strategy>(all: usize, values: S, check: impl Fn(S::Value
 #[test]
 fn no_series_breaks_its_bound() {
     let started = Instant::now();
-    tried(search(900, random_cases(), |case| case.check()), cases(1_000_000), started);
+    tried(search(900, random_cases(), |case| case.check()), cases(1_200_000), started);
 }
 
 #[test]
@@ -268,13 +268,13 @@ fn no_kind_of_series_breaks_its_bound_for_any_type() {
                 let seed = (round * 10_000 + n * 1000 + m * 30 + k) as u64;
                 let tolerance = TOLERANCES[2 + (n + 3 * m + 5 * k) % 10];
                 let (frames, window) = (33 + 9 * (k % 4), [5, 4, 3, 5][k % 4]);
-                let (edge, dims) = (4, [8, 4, 2]);
+                let (edge, dims) = (8, [16, 8, 2]);
                 let mask = Mask::None;
                 series += Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed }.check();
             }
         }
     }
-    tried(series, 350_000 * times(), started);
+    tried(series, 1_450_000 * times(), started);
 }
 
 #[test]

@@ -89,18 +89,31 @@ fn a_loop_over_frames_reads_fewer_bytes() {
     }
 }
 
-/// Views, levels of detail, errors and what is splatted, one after another.
-const LOOKS: [(f64, u32, Option<f64>, SplatSource); 6] = [
-    (10.0, 0, None, SplatSource::Coefficients),
-    (80.0, 0, None, SplatSource::Coefficients),
-    (80.0, 1, None, SplatSource::Coefficients),
-    (10.0, 0, Some(0.02), SplatSource::Coefficients),
-    (10.0, 0, None, SplatSource::Samples),
-    (10.0, 0, None, SplatSource::Coefficients),
+/// What pictures show.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    angle: f64,
+    lod: u32,
+    allowed: Option<f64>,
+    what: SplatSource,
+}
+
+const FRONT: Look = Look { angle: 10.0, lod: 0, allowed: None, what: SplatSource::Coefficients };
+const SIDE: Look = Look { angle: 80.0, ..FRONT };
+
+/// One after another.
+const LOOKS: [Look; 6] = [
+    FRONT,
+    SIDE,
+    Look { lod: 1, ..SIDE },
+    Look { allowed: Some(0.02), ..FRONT },
+    Look { what: SplatSource::Samples, ..FRONT },
+    FRONT,
 ];
 
 /// The bits of the pictures of a file.
-fn drawn(file: &CoefficientFile, (angle, lod, allowed, what): (f64, u32, Option<f64>, SplatSource)) -> Vec<u32> {
+fn drawn(file: &CoefficientFile, look: Look) -> Vec<u32> {
+    let Look { angle, lod, allowed, what } = look;
     let lod = file.coarsest_detail().min(lod);
     let mut scene = CoefficientScene::new(file.clone().with_detail(lod).expect("a level"), what);
     let view = View { size: [30, 20], ..View::new(angle, 20.0) };

@@ -4,6 +4,7 @@ use crate::common::views::{archive, field, largest, rounding, truth, view};
 use crate::common::{direct, looking, pictures, settings, stored};
 use crate::frame_pictures::under_less_memory;
 use crate::reference::splat::Images;
+use std::ops::Range;
 use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
@@ -90,27 +91,28 @@ const DIRECTIONS: [(f64, f64); 8] = [
 
 #[test]
 fn frames_on_a_lattice_keep_the_error_that_they_state() {
-    assert!(frames_keep_their_error(&DIRECTIONS[3..6]) >= 12);
+    assert!(frames_keep_their_error(3..6) >= 12);
 }
 
 #[test]
 #[ignore = "exhaustive"]
 fn frames_on_a_lattice_keep_the_error_that_they_state_in_every_direction() {
-    assert!(frames_keep_their_error(&DIRECTIONS) >= 36);
+    assert!(frames_keep_their_error(0..DIRECTIONS.len()) >= 36);
 }
 
-/// How many pictures were splatted on a lattice.
-fn frames_keep_their_error(directions: &[(f64, f64)]) -> usize {
+/// How many pictures from some of the directions were splatted on a lattice.
+fn frames_keep_their_error(directions: Range<usize>) -> usize {
     let mut found = 0;
     let grid = Grid { dims: [33, 37, 35], spacing: [1.0, 1.0, 0.8], origin: [5.0, 0.0, -3.0] };
     let mut samples = field(&grid, 2, 3);
     samples.iter_mut().for_each(|v| *v += 20.0);
     let largest = (largest(&samples), span(&samples));
-    for (n, (azimuth, elevation)) in directions.iter().copied().enumerate() {
+    for n in directions {
+        let (azimuth, elevation) = DIRECTIONS[n];
         let view = View { scale: Some(3.0), roll: 15.0 * (n % 3) as f64, ..view(azimuth, elevation, [70, 65]) };
         let tau = [0.0, 0.03][n % 2];
         let mut memory = archive(grid, SampleType::F64, &samples);
-        let region = (n == 2).then_some(Region { start: [0, 2, 1], ..grid.whole() });
+        let region = (n == 5).then_some(Region { start: [0, 2, 1], ..grid.whole() });
         let plain = RenderConfig { region, ..looking(view, tau, Quantity::Emission, &grid, 2) };
         let seen = truth(&grid, &plain, 3.0, &vec![0.0; grid.whole().voxels()], None);
         for splat_error in [2e-2, 1e-3, 3e-5] {

@@ -143,11 +143,16 @@ const ORDERED: [&str; 27] = [
     "jobs/picture/series",
 ];
 
-/// The modules of a folder, in the order of its `mod.rs` or `lib.rs`.
-fn listed(folder: &str, all: &[(String, String)]) -> Vec<String> {
+/// The `mod.rs` or `lib.rs` of a folder.
+fn root<'a>(folder: &str, all: &'a [(String, String)]) -> &'a str {
     let root = if PACKAGES.iter().any(|(package, _)| *package == folder) { "lib" } else { "mod" };
     let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/{root}.rs")).expect("a folder with modules");
-    modules(code)
+    code
+}
+
+/// The modules of a folder, in the order of its `mod.rs` or `lib.rs`.
+fn listed(folder: &str, all: &[(String, String)]) -> Vec<String> {
+    modules(root(folder, all))
 }
 
 /// The modules that a file names, in order.
@@ -158,14 +163,17 @@ fn modules(code: &str) -> Vec<String> {
 
 /// The names that a folder passes on, and the modules that have them.
 fn passed_on(folder: &str, all: &[(String, String)]) -> Vec<(String, String)> {
-    let root = if PACKAGES.iter().any(|(package, _)| *package == folder) { "lib" } else { "mod" };
-    let (_, code) = all.iter().find(|(path, _)| *path == format!("{folder}/{root}.rs")).expect("a folder with modules");
     let passed = |path: &str| {
         let (module, names) = path.split_once("::")?;
         let names = named(names).into_iter().map(|name| (name.to_string(), module.to_string()));
         Some(names.collect::<Vec<_>>())
     };
-    code.split("use ").skip(1).filter_map(passed).flatten().collect()
+    root(folder, all).split("use ").skip(1).filter_map(passed).flatten().collect()
+}
+
+/// The module that has a name, which its folder may pass on.
+fn home<'a>(used: &'a str, passed: &'a [(String, String)]) -> &'a str {
+    passed.iter().find(|(name, _)| name == used).map_or(used, |(_, module)| module)
 }
 
 /// The modules of a folder that a file below it names. `below` is the file's path from there.
@@ -199,8 +207,7 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
             let own = below.split('/').next().unwrap().trim_end_matches(".rs");
             let Some(at) = order.iter().position(|module| module == own) else { continue };
             for used in siblings(folder, below, code) {
-                let home = passed.iter().find(|(name, _)| name == used).map_or(used, |(_, module)| module);
-                let Some(other) = order.iter().position(|module| module == home) else { continue };
+                let Some(other) = order.iter().position(|module| *module == home(used, &passed)) else { continue };
                 assert!(other <= at, "src/{path}: {own} is listed before {used} in {folder}, so it may not use it");
             }
         }
@@ -210,14 +217,14 @@ fn modules_are_listed_from_the_lowest_to_the_highest() {
 /// The modules of a folder that each of its modules uses, without tests.
 fn uses<'a>(folder: &str, all: &'a [(String, String)]) -> Vec<(String, Vec<String>)> {
     let (order, passed) = (listed(folder, all), passed_on(folder, all));
-    let home =
-        |used: &str| passed.iter().find(|(name, _)| name == used).map_or(used.into(), |(_, module)| module.clone());
     let of = |own: &String| {
         let files = all.iter().filter_map(|(path, code)| Some((path.strip_prefix(&format!("{folder}/"))?, code)));
         let files = files.filter(|(below, _)| below.split('/').next().unwrap().trim_end_matches(".rs") == own);
         let files = files.filter(|(below, _)| !below.ends_with("tests.rs") && !below.ends_with("testing.rs"));
         let outside = |code: &'a str| code.split("#[cfg(test)]\nmod tests").next().unwrap();
-        let used = files.flat_map(|(below, code)| siblings(folder, below, outside(code))).map(home);
+        let used = files
+            .flat_map(|(below, code)| siblings(folder, below, outside(code)))
+            .map(|used| home(used, &passed).to_string());
         (own.clone(), used.filter(|used| used != own && order.contains(used)).collect())
     };
     order.iter().map(of).collect()

@@ -70,7 +70,7 @@ fn no_series_is_off_by_more_than_the_error_in_its_unit() {
         let mut memory = Memory::new(Grid::unit(DIMS), ty, bytes.clone());
         check(&mut memory, &bytes, ty, &config(BASES[basis], bound, ERRORS[error] * share))
     });
-    tried(series, cases(160_000), started);
+    tried(series, cases(200_000), started);
 }
 
 #[test]

@@ -26,8 +26,7 @@ mod values;
 pub mod view;
 
 pub use common::CommonArgs;
-pub use generate::command;
-pub use generate::{GenerateArgs, Generated};
+pub use generate::{GenerateArgs, Generated, command};
 pub use input::{InputArgs, SelectArgs, narrow, remembered};
 pub use messages::{advice, error_text, note_text};
 pub use program::main;

@@ -23,6 +23,7 @@ pub(super) fn picture_text(text: &str) -> String {
     worded(text, |quoted| is_field(quoted).then(|| format!("--{}", name(quoted))))
 }
 
+/// Prints a line on standard error.
 pub(super) fn note(text: impl std::fmt::Display) {
     let _ = writeln!(io::stderr().lock(), "{text}"); // a failure cannot be reported anywhere else
 }

@@ -3,8 +3,7 @@
 use super::advice;
 use super::config::Config;
 use super::generate::command;
-use super::messages;
-use super::messages::note;
+use super::messages::{self, note};
 use clap::Parser;
 use clap::error::ErrorKind;
 use std::env;

@@ -1,4 +1,4 @@
-//! The commands of both programs, which may read the same file of options.
+//! Both programs, each of which knows the options of the other.
 
 use super::{commands, render};
 use clap::{Command, CommandFactory};

@@ -33,5 +33,5 @@ fn no_short_series_breaks_its_bound() {
         let series: Vec<Vec<f64>> = parts.chunks_exact(FRAMES).map(of).collect();
         target.case.trial(&target.samples(&series)).check()
     };
-    tried(search(1500, all, check), cases(60_000), started);
+    tried(search(1500, all, check), cases(75_000), started);
 }

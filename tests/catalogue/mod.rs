@@ -14,30 +14,20 @@ use crate::common::series::{Kind, Mask};
 use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{Basis, Bound};
 
 /// Converts, extracts and exactly compares samples of a row of voxels (t slowest), with every basis and every bound.
 /// Returns the extracted samples.
 fn kept(ty: SampleType, mask: Mask, voxels: usize, samples: &[u8], tolerance: f64) -> Vec<Trial> {
-    let codings = BASES.map(|basis| BOUNDS.map(|bound| (basis, bound)));
-    let kept = |coding| kept_as(coding, ty, mask, voxels, samples, tolerance);
-    codings.concat().into_iter().map(kept).collect()
-}
-
-/// As [`kept`], with one basis and one bound.
-fn kept_as(
-    (basis, bound): (Basis, Bound),
-    ty: SampleType,
-    mask: Mask,
-    voxels: usize,
-    samples: &[u8],
-    tolerance: f64,
-) -> Trial {
     let frames = samples.len() / (voxels * ty.size());
-    let (kind, window, edge, dims, seed) = (Kind::Mixed, 5, 8, [voxels, 1, 1], 0);
-    let trial = Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed }.trial(samples);
-    trial.check();
-    trial
+    let codings = BASES.map(|basis| BOUNDS.map(|bound| (basis, bound)));
+    let trial = |(basis, bound)| {
+        let (kind, window, edge, dims, seed) = (Kind::Mixed, 5, 8, [voxels, 1, 1], 0);
+        let case = Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed };
+        let trial = case.trial(samples);
+        trial.check();
+        trial
+    };
+    codings.concat().into_iter().map(trial).collect()
 }
 
 fn rust_files(folder: &Path) -> Vec<PathBuf> {

@@ -64,9 +64,6 @@ struct Reading {
     line: String,
     victim: &'static str,
     output: Option<&'static str>,
-    /// The outcome of an undisturbed run.
-    undisturbed: Outcome,
-    duration: Duration,
 }
 
 /// The archives, and files of them.
@@ -87,14 +84,7 @@ fn inputs() -> &'static BTreeMap<&'static str, Vec<u8>> {
 impl Reading {
     fn new(line: &str, victim: &'static str, output: Option<&'static str>) -> Self {
         let line = format!("exec $WAVESPLAT {line}").replace("$WAVESPLAT render", "$RENDER");
-        let undisturbed = Outcome { code: None, error: None, left: None };
-        let mut reading = Self { work: Work::new(), line, victim, output, undisturbed, duration: Duration::ZERO };
-        reading.reset();
-        let started = Instant::now();
-        let run = reading.work.shell(&reading.line);
-        reading.duration = started.elapsed();
-        reading.undisturbed = reading.outcome(&run);
-        reading
+        Self { work: Work::new(), line, victim, output }
     }
 
     fn reset(&self) {
@@ -113,6 +103,14 @@ impl Reading {
         }
     }
 
+    /// The outcome of an undisturbed run, and how long it takes.
+    fn undisturbed(&self) -> (Outcome, Duration) {
+        self.reset();
+        let started = Instant::now();
+        let run = self.work.shell(&self.line);
+        (self.outcome(&run), started.elapsed())
+    }
+
     /// The outcome for the changed file.
     fn changed(&self, change: Change) -> Outcome {
         self.reset();
@@ -120,10 +118,11 @@ impl Reading {
         self.outcome(&self.work.shell(&self.line))
     }
 
-    fn disturbed(&self, change: Change, share: f64) -> Outcome {
+    /// The outcome if the file changes after some time.
+    fn disturbed(&self, change: Change, after: Duration) -> Outcome {
         self.reset();
         let child = self.work.command("sh").args(["-c", &self.line]).spawn().unwrap();
-        std::thread::sleep(self.duration.mul_f64(share));
+        std::thread::sleep(after);
         change.apply(&self.work, self.victim);
         self.outcome(&Run::of(&self.line, child.wait_with_output().unwrap()))
     }
@@ -142,14 +141,15 @@ fn changes_while_reading_are_noticed_or_make_no_difference() {
         ("verify a.wspl --against a.npy", "a.npy", None),
     ] {
         let readings = ["", "--no-mmap"].map(|access| Reading::new(&format!("{line} {access}"), victim, output));
+        let undisturbed = readings.each_ref().map(Reading::undisturbed);
         for (i, change) in (0..2).flat_map(|i| CHANGES.map(|change| (i, change))) {
-            let reading = &readings[i];
+            let (reading, (unchanged, duration)) = (&readings[i], &undisturbed[i]);
             let changed = reading.changed(change);
             for _ in 0..times() {
-                let run = reading.disturbed(change, random.unit());
+                let run = reading.disturbed(change, duration.mul_f64(random.unit()));
                 *found.entry((change, run.code)).or_insert(0) += 1;
                 let what = format!("{} {change:?}: {:?} {:?}", reading.line, run.code, run.error);
-                let is_of_one_state = run == reading.undisturbed || run == changed;
+                let is_of_one_state = run == *unchanged || run == changed;
                 assert!(is_of_one_state || noticed(&run, change, victim), "{what}");
             }
         }

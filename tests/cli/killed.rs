@@ -79,7 +79,7 @@ fn archive() -> Archive {
 }
 
 /// The most rounds, as a multiple of those wanted.
-const PATIENCE: usize = 4;
+const PATIENCE: usize = 10;
 
 fn rounds(jobs: &[Job], rounds: usize, seed: u64) {
     let (started, mut random, mut tally) = (Instant::now(), Random(seed), Tally::default());

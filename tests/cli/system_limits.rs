@@ -44,13 +44,12 @@ fn under_any_limit_on_the_size_of_a_file_the_work_is_kept_and_resumed() {
     assert!(steps.iter().all(|steps| *steps > 4), "{steps:?}");
 }
 
-/// 432 MiB: a ramp, with noise in every third frame.
+/// A large archive: a ramp, with noise in every third frame.
 struct Large {
     at: u64,
 }
 
 const FRAME: u64 = 4 << 20; // 128 x 128 x 64 samples of 4 bytes
-const FRAMES: u64 = 108;
 
 impl Large {
     fn fill(&mut self, out: &mut [u8]) {
@@ -67,13 +66,22 @@ impl Large {
 
 #[test]
 fn an_archive_and_a_file_larger_than_the_limit_go_through_and_back() {
+    goes_through_and_back(108, "ulimit -d 98304; exec", "--memory 48MiB --threads 2", 96 << 20);
+}
+
+#[test]
+#[ignore = "exhaustive"]
+fn a_gibibyte_goes_through_192_mib_and_back() {
+    goes_through_and_back(256, "ulimit -d 196608; exec", "--memory 64MiB --threads 2", 256 << 20);
+}
+
+/// Converts so many frames under a limit of memory, and reads and draws the file, which has at least `least` bytes.
+fn goes_through_and_back(frames: u64, limit: &str, options: &str, least: u64) {
     let (work, started) = (Work::new(), Instant::now());
-    let limit = "ulimit -d 98304; exec"; // 96 MiB
-    let options = "--memory 48MiB --threads 2";
     let convert = "$WAVESPLAT convert - -o big.wspl --dims 128x128x64 --dtype f32 --window 4 --tolerance 0 --basis haar --level 1";
     let mut child = work.command("sh").args(["-c", &format!("{limit} {convert} {options}")]).spawn().unwrap();
     let (mut input, mut source, mut chunk) = (child.stdin.take().unwrap(), Large { at: 0 }, vec![0; 1 << 20]);
-    while source.at < FRAME * FRAMES {
+    while source.at < FRAME * frames {
         source.fill(&mut chunk);
         if input.write_all(&chunk).is_err() {
             break; // the caller checks its message
@@ -83,11 +91,11 @@ fn an_archive_and_a_file_larger_than_the_limit_go_through_and_back() {
     Run::of(convert, child.wait_with_output().unwrap()).ok();
     let converted = started.elapsed();
     let bytes = std::fs::metadata(work.path("big.wspl")).unwrap().len();
-    assert!(bytes > 96 << 20, "only {bytes} bytes: they would fit");
+    assert!(bytes > least, "only {bytes} bytes: they would fit");
     let extract = format!("{limit} $WAVESPLAT extract big.wspl -o - --format raw {options}");
     let mut child = work.command("sh").args(["-c", &extract]).spawn().unwrap();
     let (mut out, mut source, mut expected) = (child.stdout.take().unwrap(), Large { at: 0 }, vec![0; 1 << 20]);
-    while source.at < FRAME * FRAMES {
+    while source.at < FRAME * frames {
         source.fill(&mut expected);
         out.read_exact(&mut chunk).unwrap();
         assert!(chunk == expected, "other samples before byte {}", source.at);
@@ -97,7 +105,7 @@ fn an_archive_and_a_file_larger_than_the_limit_go_through_and_back() {
     let extracted = started.elapsed();
     for more in ["--no-mmap", ""] {
         let render =
-            format!("{limit} $RENDER big.wspl -o p.npy --force --size 64x64 --frames 0:108:4 {options} {more}");
+            format!("{limit} $RENDER big.wspl -o p.npy --force --size 64x64 --frames 0:{frames}:9 {options} {more}");
         work.shell(&render).ok();
     }
     work.shell(&format!("{limit} $WAVESPLAT verify big.wspl {options}")).ok();

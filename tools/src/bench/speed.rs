@@ -12,7 +12,7 @@ use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
 
 /// The commands that are timed. FRAMES and FILE are the archive and its coefficient file, OUT is a new file, RANGE the
-/// range of the samples, TOLERANCE and SIZE those of the run.
+/// range of the samples, TOLERANCE that of the run.
 const CASES: [(&str, &str); 18] = [
     ("convert", "wavesplat convert FRAMES -o OUT.wspl --tolerance TOLERANCE"),
     ("convert, Haar", "wavesplat convert FRAMES -o OUT.wspl --tolerance TOLERANCE --basis haar"),

@@ -2,7 +2,8 @@
 
 /// Keeps this process and the library's workers on one core. Call before any thread starts.
 pub(super) fn stay_on_one_core() {
-    work_with(1);
+    // If a pool exists, this runs in a test, which does not judge times.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).build_global();
     #[cfg(target_os = "linux")]
     if let Ok(allowed) = rustix::thread::sched_getaffinity(None)
         && let Some(first) = (0..rustix::thread::CpuSet::MAX_CPU).find(|core| allowed.is_set(*core))
@@ -13,22 +14,16 @@ pub(super) fn stay_on_one_core() {
     }
 }
 
-/// Gives the library this many workers. Call before any thread starts.
-fn work_with(threads: usize) {
-    // If a pool exists, this runs in a test, which does not judge times.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-}
-
 /// Seconds of processor time so far.
 #[cfg(target_os = "linux")]
-pub(in crate::bench) fn seconds() -> f64 {
+pub(super) fn seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
 /// Seconds of wall time, on systems where processor time is not implemented here.
 #[cfg(not(target_os = "linux"))]
-pub(in crate::bench) fn seconds() -> f64 {
+pub(super) fn seconds() -> f64 {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }

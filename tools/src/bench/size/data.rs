@@ -108,11 +108,6 @@ pub struct Data {
 }
 
 impl Data {
-    /// The name of a file's archive.
-    pub(in crate::bench) fn name_of(path: &Path) -> String {
-        path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
-    }
-
     /// Its name and size in words.
     pub(super) fn in_words(&self) -> String {
         let [x, y, z] = self.dims;
@@ -130,7 +125,7 @@ impl Data {
             sample::load(ty, &read_frames(window.as_ref(), std::iter::once(frame), &whole, ty)?, &mut values);
             range = values.iter().fold(range, |(low, high), v| (low.min(*v), high.max(*v)));
         }
-        let name = Self::name_of(&path);
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let bytes = (frames * whole.voxels() * ty.size()) as u64;
         Ok(Self { name, path, dims: archive.grid.dims, frames, samples: ty.to_string(), bytes, range })
     }

@@ -153,7 +153,7 @@ fn by_scheme(config: &Config, data: &Data, scheme: &Scheme, tolerance: f64, file
 fn peers_task<'a>(config: &'a Config, data: &'a Data, all: bool) -> PeersTask<'a> {
     let only = (!all).then_some(peers::TIMED);
     let (path, tolerances) = (data.path.as_path(), config.tolerances.as_slice());
-    PeersTask { data: &data.name, data_bytes: data.bytes, path, tolerances, repeats: IN_A_ROW, only }
+    PeersTask { data: &data.name, data_bytes: data.bytes, path, tolerances, only }
 }
 
 fn write(results: &Results, tables: &str, folder: &Path) -> Result<()> {

@@ -1,5 +1,6 @@
 //! Coders of other programs, run by the script in `tools/peers`.
 
+use super::IN_A_ROW;
 use super::row::Row;
 use serde::Deserialize;
 use std::ffi::OsStr;
@@ -29,19 +30,19 @@ impl Peers {
     pub(super) fn generate(&self, kind: &str, folder: &Path, small: bool) -> Result<()> {
         let size: &[&str] = if small { &["--frames", "8", "--edge", "16"] } else { &[] };
         let fixed = [OsStr::new("generate"), OsStr::new(kind), OsStr::new("--out"), folder.as_os_str()];
-        self.run(&self.script, fixed.into_iter().chain(size.iter().map(OsStr::new))).map(|_| ())
+        self.run(fixed.into_iter().chain(size.iter().map(OsStr::new))).map(|_| ())
     }
 
     /// Measures all peers on a file, or only the timed one.
-    pub(in crate::bench) fn measure(&self, task: &PeersTask) -> Result<Vec<Row>> {
+    pub(super) fn measure(&self, task: &PeersTask) -> Result<Vec<Row>> {
         let tolerances: Vec<String> = task.tolerances.iter().map(|t| format!("{t:e}")).collect();
-        let (tolerances, repeats) = (tolerances.join(","), task.repeats.to_string());
+        let (tolerances, repeats) = (tolerances.join(","), IN_A_ROW.to_string());
         let mut args = vec![OsStr::new("measure"), task.path.as_os_str()];
         args.extend(["--tolerances", &tolerances, "--repeats", &repeats].map(OsStr::new));
         if let Some(only) = task.only {
             args.extend(["--peers", only].map(OsStr::new));
         }
-        let text = self.run(&self.script, args)?;
+        let text = self.run(args)?;
         let lines = String::from_utf8_lossy(&text);
         lines.lines().map(|line| self.line(line)?.row(task)).collect()
     }
@@ -50,29 +51,28 @@ impl Peers {
         serde_json::from_str(text).map_err(|e| crate::bench::json::bad_json(&self.script, &e))
     }
 
-    /// The output of a script.
-    fn run<'a>(&self, script: &Path, args: impl IntoIterator<Item = &'a OsStr>) -> Result<Vec<u8>> {
+    /// The output of the script.
+    fn run<'a>(&self, args: impl IntoIterator<Item = &'a OsStr>) -> Result<Vec<u8>> {
         let mut command = Command::new(&self.python);
-        command.arg(script).args(args).stderr(Stdio::inherit());
+        command.arg(&self.script).args(args).stderr(Stdio::inherit());
         let output = command.output().map_err(|e| Error::io(&self.python, "running", e))?;
         if output.status.success() {
             return Ok(output.stdout);
         }
-        Err(Error::input(script, format!("failed under {} ({})", self.python.display(), output.status)))
+        Err(Error::input(&self.script, format!("failed under {} ({})", self.python.display(), output.status)))
     }
 }
 
 /// The settings of a measurement by the script.
-pub(in crate::bench) struct PeersTask<'a> {
+pub(super) struct PeersTask<'a> {
     /// The name of the data.
-    pub(in crate::bench) data: &'a str,
+    pub(super) data: &'a str,
     /// Bytes of its samples.
-    pub(in crate::bench) data_bytes: u64,
-    pub(in crate::bench) path: &'a Path,
-    pub(in crate::bench) tolerances: &'a [f64],
-    pub(in crate::bench) repeats: usize,
+    pub(super) data_bytes: u64,
+    pub(super) path: &'a Path,
+    pub(super) tolerances: &'a [f64],
     /// One of the peers; none: all.
-    pub(in crate::bench) only: Option<&'a str>,
+    pub(super) only: Option<&'a str>,
 }
 
 /// A line of the script's output; see `peers.py --help`.
