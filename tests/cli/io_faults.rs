@@ -113,7 +113,7 @@ const CONVERT: &str = "--window 4 --threads 1 --basis haar --block 8";
 
 #[test]
 fn a_conversion_survives_a_fault_at_every_operation() {
-    disturb(&[Job::convert(&archive(), "a.npy", CONVERT)], 350);
+    disturb(&[Job::convert(&archive(), "a.npy", CONVERT)], 400);
 }
 
 #[test]
