@@ -16,7 +16,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::ptr;
-use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicUsize, Ordering};
 use std::thread;
 use std::time::SystemTime;
 
@@ -289,7 +289,15 @@ pub fn on_interrupt(end: impl FnOnce(c_int) + Send + 'static) {
     }
 }
 
+/// Whether a thread reports a SIGBUS already.
+static REPORTED: AtomicBool = AtomicBool::new(false);
+
 extern "C" fn on_sigbus(_signal: c_int, info: *mut libc::siginfo_t, _context: *mut c_void) {
+    // Several threads may read the same lost page: their messages would mix.
+    while REPORTED.swap(true, Ordering::SeqCst) {
+        // SAFETY: `pause` is async-signal-safe. The reporting thread ends the process.
+        unsafe { libc::pause() };
+    }
     // SAFETY: the kernel passes a valid `info` to a handler installed with SA_SIGINFO.
     let address = unsafe { (*info).si_addr() } as usize;
     let path = SLOTS.iter().find(|s| s.holds(address)).map(|s| s.path.load(Ordering::SeqCst));
