@@ -1,5 +1,8 @@
 //! Processor time of this process on one core, over all its threads. Busy neighbours disturb this time least.
 
+/// Number of timed repetitions in a row in each round, after one that is not counted.
+pub(super) const IN_A_ROW: usize = 2;
+
 /// Keeps this process and the library's workers on one core. Call before any thread starts.
 pub(super) fn stay_on_one_core() {
     // If a pool exists, this runs in a test, which does not judge times.

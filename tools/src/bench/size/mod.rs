@@ -32,6 +32,7 @@ pub use targets::Verdict;
 use super::json::bad_json;
 use super::machine::Provenance;
 use super::process::in_process;
+use clock::IN_A_ROW;
 use own::Task;
 use peers::PeersTask;
 use std::collections::HashSet;
@@ -41,8 +42,6 @@ use wavesplat::base::error::{Error, Result};
 
 /// The layout version of `size.json`; changes if the meaning of a key changes.
 pub const SCHEMA: u32 = 1;
-/// Number of timed repetitions in a row in each round, after one that is not counted.
-pub const IN_A_ROW: usize = 2;
 
 /// The settings of a run.
 #[derive(Debug, Clone)]

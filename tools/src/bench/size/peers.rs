@@ -1,6 +1,6 @@
 //! Coders of other programs, run by the script in `tools/peers`.
 
-use super::IN_A_ROW;
+use super::clock::IN_A_ROW;
 use super::row::Row;
 use serde::Deserialize;
 use std::ffi::OsStr;
