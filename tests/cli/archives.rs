@@ -184,18 +184,3 @@ fn a_pipe_carries_a_coefficient_file_unchanged() {
     let early = work.shell("$WAVESPLAT extract a.wspl -o - --format nc | head -c 100 | wc -c").ok();
     assert_eq!((early.text().trim(), early.err.as_str()), ("100", ""));
 }
-
-#[test]
-fn formats_that_are_not_built_in_explain_how_to_get_them() {
-    let formats = [
-        (cfg!(feature = "hdf5"), "hdf5/gzip.h5", "hdf5"),
-        (cfg!(feature = "netcdf"), "netcdf/cdf1.nc", "netcdf"),
-        (cfg!(feature = "tiff"), "tiff/u8.tif", "tiff"),
-        (cfg!(feature = "zarr"), "zarr/v3_zstd.zarr", "zarr"),
-    ];
-    for (_, source, feature) in formats.into_iter().filter(|(is_built_in, ..)| !is_built_in) {
-        let advice = format!("cargo build --release --features {feature}");
-        let source = input(source);
-        Work::new().wavesplat(&format!("convert {source} -o a.wspl")).fails(3, &["not built in", &advice]);
-    }
-}

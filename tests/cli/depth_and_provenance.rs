@@ -153,16 +153,6 @@ fn a_sidecar_has_the_report_with_what_made_the_pictures() {
     assert_eq!(work.names(), ["a.npy", "a.wspl", "p.json", "p_2.png", "p_5.png", "q.json"]);
 }
 
-#[cfg(not(feature = "exr"))]
-#[test]
-fn exr_without_its_feature_explains_how_to_get_it() {
-    let work = Work::with_file("");
-    work.render("a.wspl -o p_%d.exr").fails(2, &["p_%d.exr", "cargo build --release --features exr"]);
-    work.render("a.wspl -o - --format exr").fails(2, &["--features exr"]);
-    work.render("a.wspl -o v.npy --error-image e_%d.exr").fails(2, &["e_%d.exr", "--features exr"]);
-    assert_eq!(work.names(), ["a.npy", "a.wspl"]);
-}
-
 /// The channels of an OpenEXR file by name, and its comments.
 #[cfg(feature = "exr")]
 fn decode_exr(bytes: &[u8]) -> (BTreeMap<String, Vec<f32>>, String) {

@@ -1,21 +1,35 @@
-//! Arranges pictures: contact sheets, a colour bar, differences, labels.
+//! Arranges pictures: contact sheets, a colour bar, differences, texts.
 
 use crate::diff::measure::of_pixels;
-use font8x8::legacy::BASIC_LEGACY;
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufReader, Write};
+use std::path::Path;
 use wavesplat::base::error::{Error, Result};
+use wavesplat::render::annotate::Letters;
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
 
-/// Pixels of a letter's side at size 1.
-pub const LETTER: usize = 8;
-/// Pixels between pictures of a sheet, and around a bar.
-pub const GAP: usize = 4;
-/// Pixels from one line of a title to the next.
-const LINE: usize = LETTER + 4;
-/// Pixels: the width of a bar, and its least height.
-const BAR: [usize; 2] = [16, 64];
+/// How a sheet looks.
+#[derive(Debug, Clone, Copy)]
+pub struct Style {
+    /// The height of a line of letters in pixels.
+    pub line: usize,
+    /// The colour of letters.
+    pub ink: Rgb,
+    /// The colour around pictures.
+    pub paper: Rgb,
+}
+
+impl Style {
+    /// Black on white.
+    pub const LIGHT: Self = Self { line: 16, ink: [0; 3], paper: [255; 3] };
+
+    /// Pixels between pictures of a sheet, and around a bar.
+    pub fn gap(&self) -> usize {
+        self.line / 3
+    }
+}
 
 /// A picture; row 0 is at the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,35 +49,43 @@ impl Image {
         Self { width, height, pixels }
     }
 
-    /// Sets a pixel; does nothing outside of the picture.
-    pub fn set(&mut self, x: usize, y: usize, colour: Rgb) {
+    /// Puts a share of a colour over a pixel; does nothing outside of the picture.
+    fn put(&mut self, x: usize, y: usize, colour: Rgb, share: f64) {
         if x < self.width && y < self.height {
-            self.pixels[y * self.width + x] = colour;
+            let pixel = &mut self.pixels[y * self.width + x];
+            let mixed = |c: usize| f64::from(pixel[c]) + share * (f64::from(colour[c]) - f64::from(pixel[c]));
+            *pixel = std::array::from_fn(|c| mixed(c).round() as u8);
         }
     }
 
     /// Copies a picture into this one with its upper left corner at (x, y), and clips it.
     pub fn paste(&mut self, picture: &Self, x: usize, y: usize) {
         for (i, colour) in picture.pixels.iter().enumerate() {
-            self.set(x + i % picture.width, y + i / picture.width, *colour);
+            self.put(x + i % picture.width, y + i / picture.width, *colour, 1.0);
         }
     }
 
-    /// Writes ASCII text with its upper left corner at (x, y), a letter being `8 * size` pixels wide and high.
-    /// Other characters become question marks.
-    pub fn label(&mut self, text: &str, x: usize, y: usize, size: usize, colour: Rgb) {
-        for (i, letter) in text.chars().enumerate() {
-            self.letter(letter, x + i * LETTER * size, y, size, colour);
-        }
-    }
-
-    fn letter(&mut self, letter: char, x: usize, y: usize, size: usize, colour: Rgb) {
-        let rows = BASIC_LEGACY[if letter.is_ascii() { letter as usize } else { '?' as usize }];
-        for (v, u) in (0..LETTER * size).flat_map(|v| (0..LETTER * size).map(move |u| (v, u))) {
-            if rows[v / size] >> (u / size) & 1 == 1 {
-                self.set(x + u, y + v, colour);
+    /// Writes a text in the line whose upper left corner is at (x, y).
+    pub fn write(&mut self, text: &str, x: usize, y: usize, style: &Style) {
+        let letters = style.letters();
+        let middle = [x as f64 + letters.width(text) / 2.0, (y as f64 + style.line as f64 / 2.0).round()];
+        letters.draw(text, middle, |x, y, share| {
+            if let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) {
+                self.put(x, y, style.ink, share);
             }
-        }
+        });
+    }
+
+    /// Reads a PNG of 8 bits a channel, without its opacities.
+    pub fn read_png(path: &Path) -> Result<Self> {
+        let bad = |e: png::DecodingError| Error::io(path, "reading", std::io::Error::other(e));
+        let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+        let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(bad)?;
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap_or_default()];
+        let info = reader.next_frame(&mut bytes).map_err(bad)?;
+        let channels = info.color_type.samples();
+        let pixels = bytes.chunks_exact(channels).map(|p| std::array::from_fn(|c| p[c.min(channels - 1)])).collect();
+        Ok(Self { width: info.width as usize, height: info.height as usize, pixels })
     }
 
     /// Writes the picture as a PNG.
@@ -81,75 +103,112 @@ impl Image {
     }
 }
 
-/// Pictures in rows of `columns`, with `gap` pixels between and around them.
-///
-/// # Panics
-/// The pictures have different sizes, or `columns` is 0.
-pub fn contact_sheet(pictures: &[Image], columns: usize, gap: usize, background: Rgb) -> Image {
-    let (w, h) = pictures.first().map_or((0, 0), |p| (p.width, p.height));
-    assert!(pictures.iter().all(|p| (p.width, p.height) == (w, h)), "pictures of one size");
-    let (columns_used, rows) = (columns.min(pictures.len()), pictures.len().div_ceil(columns));
-    let mut sheet = Image::from_fn(gap + columns_used * (w + gap), gap + rows * (h + gap), |_, _| background);
-    for (i, picture) in pictures.iter().enumerate() {
-        sheet.paste(picture, gap + i % columns * (w + gap), gap + i / columns * (h + gap));
+impl Style {
+    fn letters(&self) -> Letters {
+        Letters::new(self.line as f64)
     }
-    sheet
+
+    /// The width of a text in pixels.
+    fn width(&self, text: &str) -> usize {
+        self.letters().width(text).ceil() as usize
+    }
+
+    fn blank(&self, width: usize, height: usize) -> Image {
+        Image::from_fn(width, height, |_, _| self.paper)
+    }
+
+    /// Pictures in rows of `columns`, with gaps between and around them.
+    ///
+    /// # Panics
+    /// The pictures have different sizes, or `columns` is 0.
+    pub fn contact_sheet(&self, pictures: &[Image], columns: usize) -> Image {
+        let (w, h) = pictures.first().map_or((0, 0), |p| (p.width, p.height));
+        assert!(pictures.iter().all(|p| (p.width, p.height) == (w, h)), "pictures of one size");
+        let (columns_used, rows, gap) = (columns.min(pictures.len()), pictures.len().div_ceil(columns), self.gap());
+        let mut sheet = self.blank(gap + columns_used * (w + gap), gap + rows * (h + gap));
+        for (i, picture) in pictures.iter().enumerate() {
+            sheet.paste(picture, gap + i % columns * (w + gap), gap + i / columns * (h + gap));
+        }
+        sheet
+    }
+
+    /// The picture with lines of text above it. Long lines are cut at its edge.
+    pub fn titled(&self, picture: &Image, lines: &[impl AsRef<str>]) -> Image {
+        let step = self.line + self.gap();
+        let mut all = self.blank(picture.width, picture.height + lines.len() * step);
+        lines.iter().enumerate().for_each(|(n, line)| all.write(line.as_ref(), 0, n * step, self));
+        all.paste(picture, 0, lines.len() * step);
+        all
+    }
+
+    /// Breaks a text after spaces and commas into lines that are no wider than `width` pixels, if possible.
+    pub fn broken(&self, text: &str, width: usize) -> Vec<String> {
+        let mut lines = vec![String::new()];
+        for word in text.split_inclusive([' ', ',']) {
+            match lines.last_mut() {
+                Some(line) if line.is_empty() || self.width(&format!("{line}{}", word.trim_end())) <= width => {
+                    line.push_str(word);
+                }
+                _ => lines.push(word.into()),
+            }
+        }
+        lines
+    }
+
+    /// Pictures one above the other.
+    pub fn stacked(&self, pictures: &[Image]) -> Image {
+        let width = pictures.iter().map(|p| p.width).max().unwrap_or(0);
+        let mut all = self.blank(width, pictures.iter().map(|p| p.height).sum());
+        let mut top = 0;
+        for picture in pictures {
+            all.paste(picture, 0, top);
+            top += picture.height;
+        }
+        all
+    }
+
+    /// A sheet with a colour bar at its right and labels for the bar's top, middle and bottom.
+    pub fn with_bar(&self, sheet: &Image, labels: &[String; 3], colour: impl Fn(f64) -> Rgb) -> Image {
+        let (bar, gap) = (self.line, self.gap());
+        let (left, height) = (sheet.width + gap, sheet.height.max(4 * self.line + 2 * gap));
+        let text = left + bar + gap;
+        let words = labels.iter().map(|label| self.width(label)).max().unwrap_or(0);
+        let mut all = self.blank(text + words + gap, height);
+        all.paste(sheet, 0, 0);
+        let rim = Image::from_fn(bar + 2, height - 2 * gap, |_, _| self.ink);
+        all.paste(&rim, left - 1, gap);
+        all.paste(&colour_bar(bar, height - 2 * gap - 2, colour), left, gap + 1);
+        let rows = [gap, (height - self.line) / 2, height - gap - self.line];
+        labels.iter().zip(rows).for_each(|(label, y)| all.write(label, text, y, self));
+        all
+    }
 }
 
 /// An upright bar with `colour(0)` at the bottom and `colour(1)` at the top.
-pub fn colour_bar(width: usize, height: usize, colour: impl Fn(f64) -> Rgb) -> Image {
+fn colour_bar(width: usize, height: usize, colour: impl Fn(f64) -> Rgb) -> Image {
     let last = height.saturating_sub(1);
     Image::from_fn(width, height, |_, y| colour((last - y) as f64 / last.max(1) as f64))
 }
 
-/// The picture with a text above it, in lines no longer than it is wide.
-pub fn titled(picture: &Image, lines: &[&str], ink: Rgb, paper: Rgb) -> Image {
-    let band = lines.len() * LINE;
-    let mut all = Image::from_fn(picture.width, picture.height + band, |_, _| paper);
-    lines.iter().enumerate().for_each(|(n, line)| all.label(line, 0, n * LINE, 1, ink));
-    all.paste(picture, 0, band);
-    all
-}
+/// The colours of differences at even steps: white for none, dark red for 1 and more.
+const DIFFERENCES: [Rgb; 5] = [[255; 3], [255, 231, 140], [252, 150, 60], [214, 47, 39], [128, 0, 38]];
 
-/// Pictures one above the other.
-pub fn stacked(pictures: &[Image], paper: Rgb) -> Image {
-    let width = pictures.iter().map(|p| p.width).max().unwrap_or(0);
-    let mut all = Image::from_fn(width, pictures.iter().map(|p| p.height).sum(), |_, _| paper);
-    let mut top = 0;
-    for picture in pictures {
-        all.paste(picture, 0, top);
-        top += picture.height;
-    }
-    all
-}
-
-/// A sheet with a colour bar at its right and labels for the bar's top, middle and bottom.
-pub fn with_bar(sheet: &Image, labels: &[String; 3], ink: Rgb, paper: Rgb, colour: impl Fn(f64) -> Rgb) -> Image {
-    let letters = labels.iter().map(String::len).max().unwrap_or(0);
-    let (left, height) = (sheet.width + GAP, sheet.height.max(BAR[1] + 2 * GAP));
-    let text = left + BAR[0] + GAP;
-    let mut all = Image::from_fn(text + letters * LETTER + GAP, height, |_, _| paper);
-    all.paste(sheet, 0, 0);
-    all.paste(&colour_bar(BAR[0], height - 2 * GAP, colour), left, GAP);
-    let rows = [GAP, (height - LETTER) / 2, height - GAP - LETTER];
-    labels.iter().zip(rows).for_each(|(label, y)| all.label(label, text, y, 1, ink));
-    all
-}
-
-/// Blue for 0 through cyan, green and yellow to red for 1 and more: hue 240 to 0 degrees, full saturation and value.
+/// White for 0 through yellow and orange to dark red for 1 and more.
 pub fn difference_colour(value: f64) -> Rgb {
-    let hue = 4.0 * (1.0 - value.clamp(0.0, 1.0)); // in sixths of the circle
-    let channel = |at: f64| {
-        let away = (hue - at).rem_euclid(6.0);
-        ((2.0 - away.min(6.0 - away)).clamp(0.0, 1.0) * 255.0).round() as u8
-    };
-    [channel(0.0), channel(2.0), channel(4.0)]
+    let at = value.clamp(0.0, 1.0) * (DIFFERENCES.len() - 1) as f64;
+    let (below, share) =
+        ((at as usize).min(DIFFERENCES.len() - 2), at - at.floor().min((DIFFERENCES.len() - 2) as f64));
+    let [from, to] = [below, below + 1].map(|n| DIFFERENCES[n].map(f64::from));
+    std::array::from_fn(|c| (from[c] + share * (to[c] - from[c])).round() as u8)
 }
+
+/// The background of pictures of differences.
+pub const BACKGROUND: Rgb = [224; 3];
 
 /// |a - b| / scale in [`difference_colour`], as one picture of `width` pixels a row for each `height` rows. A pixel has
 /// `channels` numbers; the one that differs most is shown.
 ///
-/// Where both have the background, NaN, it is black; where only one has it, the difference counts as 1.
+/// Where both have the background, NaN, it is grey; where only one has it, the difference counts as 1.
 ///
 /// # Panics
 /// If `a` and `b` differ in length or do not consist of whole pictures.
@@ -166,10 +225,10 @@ pub fn difference_images(
     colours.chunks_exact(width * height).map(picture).collect()
 }
 
-/// The colour of a difference as a share of `scale`; black for none, where both are background.
+/// The colour of a difference as a share of `scale`; grey for none, where both are background.
 pub fn heat(difference: Option<f64>, scale: f64) -> Rgb {
     match difference {
-        None => [0; 3],
+        None => BACKGROUND,
         Some(0.0) => difference_colour(0.0), // even if the scale is 0
         Some(f64::INFINITY) => difference_colour(1.0),
         Some(difference) => difference_colour(difference / scale),
@@ -183,6 +242,7 @@ mod tests {
 
     const RED: Rgb = [255, 0, 0];
     const BLUE: Rgb = [0, 0, 255];
+    const STYLE: Style = Style { line: 12, ink: RED, paper: [7; 3] };
 
     fn plain(colour: Rgb) -> Image {
         Image::from_fn(4, 3, |_, _| colour)
@@ -194,7 +254,8 @@ mod tests {
 
     #[test]
     fn sheets_have_their_pictures_in_rows_and_columns() {
-        let sheet = contact_sheet(&[plain(RED), plain(BLUE), plain([9; 3])], 2, 1, [7; 3]);
+        let style = Style { line: 3, ..STYLE };
+        let sheet = style.contact_sheet(&[plain(RED), plain(BLUE), plain([9; 3])], 2);
         assert_eq!((sheet.width, sheet.height), (11, 9));
         assert_eq!((pixel(&sheet, 0, 0), pixel(&sheet, 5, 2)), ([7; 3], [7; 3]));
         assert_eq!((pixel(&sheet, 1, 1), pixel(&sheet, 4, 3)), (RED, RED));
@@ -204,21 +265,21 @@ mod tests {
 
     #[test]
     fn a_png_reads_back() {
-        let (image, mut bytes) = (Image::from_fn(5, 2, |x, y| [x as u8, y as u8, 3]), Vec::new());
-        image.write_png(&mut bytes).unwrap();
-        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        let info = reader.next_frame(&mut pixels).unwrap();
-        assert_eq!((info.width, info.height), (5, 2));
-        assert_eq!(pixels, image.pixels.as_flattened());
+        let image = Image::from_fn(5, 2, |x, y| [x as u8, y as u8, 3]);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        image.write_png(file.as_file()).unwrap();
+        assert_eq!(Image::read_png(file.path()).unwrap(), image);
+        std::fs::write(file.path(), b"no picture").unwrap();
+        assert!(Image::read_png(file.path()).is_err());
     }
 
     #[test]
-    fn differences_run_from_blue_to_red() {
-        let colours = [0.0, 0.25, 0.5, 0.75, 1.0, 9.0].map(difference_colour);
-        assert_eq!(colours, [BLUE, [0, 255, 255], [0, 255, 0], [255, 255, 0], RED, RED]);
+    fn differences_run_from_white_to_dark_red() {
+        let colours = [0.0, 0.25, 0.375, 0.5, 1.0, 9.0].map(difference_colour);
+        let between = [254, 191, 100];
+        assert_eq!(colours, [DIFFERENCES[0], DIFFERENCES[1], between, DIFFERENCES[2], DIFFERENCES[4], DIFFERENCES[4]]);
         let bar = colour_bar(2, 5, difference_colour);
-        assert_eq!((pixel(&bar, 0, 0), pixel(&bar, 1, 2), pixel(&bar, 0, 4)), (RED, [0, 255, 0], BLUE));
+        assert_eq!([0, 2, 4].map(|y| pixel(&bar, 1, y)), [DIFFERENCES[4], DIFFERENCES[2], DIFFERENCES[0]]);
     }
 
     #[test]
@@ -226,39 +287,46 @@ mod tests {
         let nan = f32::NAN;
         let images = difference_images(&[1.0, nan, 2.0, nan], &[1.5, nan, 2.0, 0.0], ([2, 1], 1), 0.5);
         assert_eq!(images.len(), 2);
-        assert_eq!(images[0].pixels, [RED, [0; 3]]);
-        assert_eq!(images[1].pixels, [BLUE, RED]);
+        assert_eq!(images[0].pixels, [DIFFERENCES[4], BACKGROUND]);
+        assert_eq!(images[1].pixels, [DIFFERENCES[0], DIFFERENCES[4]]);
     }
 
     #[test]
     fn a_pixel_shows_the_channel_that_differs_most() {
         let images = difference_images(&[1.0, 2.0, 3.0, 4.0], &[1.0, 2.5, 3.0, 4.0], ([2, 1], 2), 0.5);
-        assert_eq!(images[0].pixels, [RED, BLUE]);
+        assert_eq!(images[0].pixels, [DIFFERENCES[4], DIFFERENCES[0]]);
     }
 
     #[test]
     fn a_bar_is_beside_the_smallest_sheet() {
         let labels = ["1", "x", "0"].map(String::from);
-        let all = with_bar(&Image::from_fn(2, 2, |_, _| [0; 3]), &labels, RED, [7; 3], difference_colour);
-        assert_eq!(pixel(&all, 2 + GAP, GAP), difference_colour(1.0));
-        assert_eq!(pixel(&all, 2 + GAP, all.height - GAP - 1), difference_colour(0.0));
+        let all = STYLE.with_bar(&Image::from_fn(2, 2, |_, _| [0; 3]), &labels, difference_colour);
+        let (x, gap) = (2 + STYLE.gap(), STYLE.gap());
+        assert_eq!(pixel(&all, x, gap + 1), difference_colour(1.0));
+        assert_eq!(pixel(&all, x, all.height - gap - 2), difference_colour(0.0));
         assert!(all.pixels.contains(&RED));
     }
 
     #[test]
     fn titles_are_above_and_pictures_below_one_another() {
-        let named = titled(&plain(BLUE), &["I", ""], RED, [7; 3]);
-        assert_eq!((named.height, pixel(&named, 0, 2 * LINE)), (2 * LINE + 3, BLUE));
-        assert!(named.pixels[..LINE * 4].contains(&RED));
-        let stack = stacked(&[plain(RED), named], [9; 3]);
-        assert_eq!((stack.width, stack.height, pixel(&stack, 3, 2)), (4, 2 * LINE + 6, RED));
+        let named = STYLE.titled(&plain(BLUE), &["M", ""]);
+        assert_eq!((named.height, pixel(&named, 0, 2 * 16)), (2 * 16 + 3, BLUE));
+        assert!(named.pixels[..16 * 4].iter().any(|pixel| *pixel != [7; 3]));
+        let stack = STYLE.stacked(&[plain(RED), named]);
+        assert_eq!((stack.width, stack.height, pixel(&stack, 3, 2)), (4, 2 * 16 + 6, RED));
     }
 
     #[test]
-    fn labels_draw_letters_and_stop_at_the_edge() {
-        let mut image = Image::from_fn(20, 16, |_, _| [0; 3]);
-        image.label("Ié|", 0, 0, 2, RED);
-        let column = |x| (0..16).filter(|y| pixel(&image, x, *y) == RED).count();
-        assert!(column(6) == 14 && column(0) == 0, "the stem of an I: {} {}", column(6), column(0));
+    fn texts_are_broken_where_they_can_be() {
+        let width = STYLE.width("one two,");
+        assert_eq!(STYLE.broken("one two,three", width), ["one two,", "three"]);
+        assert_eq!(STYLE.broken("immeasurable two", 10), ["immeasurable ", "two"]);
+    }
+
+    #[test]
+    fn texts_stop_at_the_edge() {
+        let mut image = STYLE.blank(8, 12);
+        image.write("long Ωµ", 0, 0, &STYLE);
+        assert!(image.pixels.iter().any(|pixel| *pixel != STYLE.paper));
     }
 }

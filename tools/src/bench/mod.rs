@@ -8,7 +8,6 @@
 //! camera     the views, and the pixels and frames that are compared with the reference
 //! settings   the settings of a run
 //! reference  the compared pixels by brute force
-//! textbook   the textbook form of the conventional method
 //! point      the recorded measurements
 //! journal    finished points on disk, so that a run can be interrupted
 //! sanity     checks of every point that hold on any machine
@@ -33,7 +32,6 @@ pub mod plan;
 mod camera;
 mod settings;
 mod reference;
-mod textbook;
 pub mod point;
 mod journal;
 pub mod sanity;

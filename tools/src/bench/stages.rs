@@ -5,8 +5,8 @@ use super::json::bad_json;
 use super::plan::{BASES, BOUNDS};
 use super::process::ProcessTask;
 use super::reference::{ImageError, ReferencePixels};
-use super::textbook;
 use crate::scenes::MEMORY;
+use crate::textbook::{self, Splatter};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::BufReader;
@@ -266,9 +266,11 @@ fn by_textbook(
     sink: &mut dyn FnMut(usize, &[f32]),
 ) -> Result<ViewTiming> {
     let (clock, mut in_sink) = (Instant::now(), 0.0);
-    textbook::render(source, step.frames, camera, radius, &mut |frame, picture| {
+    let grid = source.archive().grid;
+    let splatter = Splatter::new(&grid, &camera.view(), Kernel::new(Some(SIGMA), 0.0, &grid)?, radius)?;
+    textbook::render(source, step.frames, &splatter, |value| [value], &mut |frame, picture| {
         let clock = Instant::now();
-        sink(frame, picture);
+        sink(frame, picture.as_flattened());
         in_sink += clock.elapsed().as_secs_f64();
     })?;
     let seconds = clock.elapsed().as_secs_f64() - in_sink;

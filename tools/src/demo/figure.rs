@@ -1,7 +1,7 @@
 //! Figure 5: a row for each method, and a row for the difference of each from the first.
 
 use super::{Demo, Run};
-use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, difference_images, stacked, titled, with_bar};
+use crate::sheet::{BACKGROUND, Image, Style, difference_colour, difference_images};
 use wavesplat::base::error::Result;
 use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::source::CHANNELS;
@@ -9,29 +9,27 @@ use wavesplat_core::base::output::Output;
 
 /// The frames that are shown.
 const SHOWN: [usize; 4] = [5, 10, 15, 20];
-const PAPER: Rgb = [40; 3];
-const INK: Rgb = [255; 3];
+const STYLE: Style = Style::LIGHT;
 
 /// Draws the runs with three channels. The first one is the reference.
 pub(super) fn draw(demo: &Demo, runs: &[Run], colours: &TransferFunction) -> Result<()> {
-    let means = Scale::new(colours, (0.0, 1.0), Norm::Linear, [0; 3])?;
+    let means = Scale::new(colours, (0.0, 1.0), Norm::Linear, BACKGROUND)?;
     let bound = runs.iter().map(Run::bound).fold(0.0, f64::max);
     let [pictures, differences] = bars(colours.range(), bound);
     let sheets = [
-        with_bar(&methods(demo, runs, &means), &pictures, INK, PAPER, |share| means.colour_at(share)),
-        with_bar(&errors(demo, runs, bound), &differences, INK, PAPER, difference_colour),
+        STYLE.with_bar(&methods(demo, runs, &means), &pictures, |share| means.colour_at(share)),
+        STYLE.with_bar(&errors(demo, runs, bound), &differences, difference_colour),
     ];
     let path = demo.figure();
     let mut out = Output::create(&path, true)?;
-    stacked(&sheets, PAPER).write_png(&mut out)?;
+    STYLE.stacked(&sheets).write_png(&mut out)?;
     out.commit()
 }
 
-/// The labels of the bars of pictures and of differences, equally wide.
-fn bars((lo, hi): (f64, f64), bound: f64) -> [[String; 3]; 2] {
-    let shares = [format!("{bound:.2} bound"), "difference".into(), "0".into()];
-    let labels = [[format!("{hi:.1e}"), "|J|, A/m^2".into(), format!("{lo:.1e}")], shares];
-    labels.map(|bar: [String; 3]| bar.map(|label| format!("{label:<10}")))
+/// The labels of the bars of pictures and of differences.
+fn bars((_, hi): (f64, f64), bound: f64) -> [[String; 3]; 2] {
+    let pictures = [format!("{:.0} A/mm²", hi / 1e6), "|J|".into(), "0".into()];
+    [pictures, [format!("{bound:.2}, the bound"), "difference".into(), "0".into()]]
 }
 
 /// A row for each method with its pictures of the shown frames.
@@ -45,7 +43,7 @@ fn methods(demo: &Demo, runs: &[Run], means: &Scale) -> Image {
             rows.push(named(&image, &format!("({letter}) {}, frame {frame}", run.name)));
         }
     }
-    contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
+    STYLE.contact_sheet(&rows, SHOWN.len())
 }
 
 /// A row for each other method with its differences from the first. A pixel shows its channel that differs most.
@@ -55,14 +53,14 @@ fn errors(demo: &Demo, runs: &[Run], bound: f64) -> Image {
     for (letter, run) in ('a'..).skip(runs.len()).zip(&runs[1..]) {
         let images = difference_images(&truth, &shown(run, demo.size), (demo.size, CHANNELS.len()), bound);
         for (frame, image) in SHOWN.iter().zip(images) {
-            rows.push(named(&image, &format!("({letter}) |{} - (a)|, frame {frame}", run.name)));
+            rows.push(named(&image, &format!("({letter}) |{} − (a)|, frame {frame}", run.name)));
         }
     }
-    contact_sheet(&rows, SHOWN.len(), GAP, PAPER)
+    STYLE.contact_sheet(&rows, SHOWN.len())
 }
 
 fn named(image: &Image, name: &str) -> Image {
-    titled(image, &[name], INK, PAPER)
+    STYLE.titled(image, &[name])
 }
 
 /// The shown frames of all pictures.

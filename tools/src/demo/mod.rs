@@ -11,12 +11,15 @@ use crate::diff::measure::Differences;
 use crate::eddy::{Magnet, Plate, eddy_currents};
 use crate::output::{Format, Shape, Target};
 use crate::scenes::{MEMORY, converted, pictures};
+use crate::textbook::{self, Splatter};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
+use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::SampleType;
-use wavesplat::colour::TransferFunction;
+use wavesplat::colour::{ColourSpace, TransferFunction};
 use wavesplat::convert::{Basis, ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::{Comparison, verify};
@@ -32,8 +35,11 @@ pub const FRAMES: usize = 32;
 const TOLERANCE: f64 = 0.02;
 /// The splat error that all methods may add.
 const SPLAT_ERROR: f64 = TOLERANCE / 10.0;
-/// The paper's colours: small values blue, large ones red.
-const COLOURS: &str = "rainbow";
+/// The colours of samples, from small to large. The n-th of N stands at the share (n / N)^2 of the range, because most
+/// currents are far smaller than the largest one.
+const COLOURS: [u32; 7] = [0xffffff, 0xfee0a0, 0xfdae61, 0xf0603f, 0xc1304b, 0x7a1f70, 0x2c115f];
+/// The cut of the textbook's footprints in standard deviations: it leaves out a fortieth of their weight.
+const CUT: f64 = 3.0;
 /// The share of the plate's thickness over which attenuation reaches a factor of e. Currents stay near the face that
 /// the magnet passes; a mean through the whole plate would show only the first colours.
 const ATTENUATION: f64 = 0.1;
@@ -117,13 +123,22 @@ impl Run {
     }
 }
 
+/// All runs. The first of each list is the conventional method by the lattice that the others use.
+struct Experiment {
+    /// With three channels.
+    coloured: Vec<Run>,
+    /// With one channel.
+    plain: Vec<Run>,
+    /// The conventional method as the paper has it, with three channels.
+    textbook: Run,
+}
+
 /// Solves, converts, renders and compares. Draws figure 5 and returns table 1 as text. Reports progress through `say`.
 ///
 /// # Errors
 /// Files cannot be written or read again.
 pub fn run(demo: &Demo, say: &mut dyn FnMut(&str)) -> Result<String> {
-    let [coloured, plain] = demo.experiment(say)?;
-    Ok(table::text(demo, &coloured, &plain))
+    Ok(table::text(demo, &demo.experiment(say)?))
 }
 
 /// Writes the solver's frames of |J| (A/m^2) as `frame_0000.npy` and so on.
@@ -147,20 +162,25 @@ impl Demo {
     }
 
     /// All methods with three channels, which figure 5 shows, and with one.
-    fn experiment(&self, say: &mut dyn FnMut(&str)) -> Result<[Vec<Run>; 2]> {
+    fn experiment(&self, say: &mut dyn FnMut(&str)) -> Result<Experiment> {
         let [x, y, z] = self.plate.dims;
         say(&format!("solving for eddy currents in a plate under a passing magnet ({x}x{y}x{z}, {FRAMES} frames)"));
         write_frames(&self.frames(), self.plate, FRAMES)?;
         let colours = self.colours()?;
         let coloured = self.all_methods(Some(&colours), say)?;
         figure::draw(self, &coloured, &colours)?;
-        Ok([coloured, self.all_methods(None, say)?])
+        say("conventional, three channels, by a table of footprints");
+        let textbook = self.textbook(&colours)?;
+        Ok(Experiment { coloured, plain: self.all_methods(None, say)?, textbook })
     }
 
-    /// The colours of the paper over the range of all samples.
+    /// Colours over the range of all samples.
     fn colours(&self) -> Result<TransferFunction> {
         let range = source::value_range(self.source()?.as_mut(), None, &Silent)?;
-        let colours = TransferFunction::open(COLOURS)?;
+        let share = |n: usize| n as f64 / (COLOURS.len() - 1) as f64;
+        let colour = |rgb: u32| [16, 8, 0].map(|bits| f64::from(rgb >> bits & 0xff) / 255.0);
+        let points = COLOURS.iter().enumerate().map(|(n, rgb)| (share(n).powi(2), colour(*rgb))).collect();
+        let colours = TransferFunction::from_points(points, ColourSpace::Rgb, None, None).map_err(Error::usage)?;
         colours.over(colours.suitable(range.unwrap_or((0.0, 1.0))))
     }
 
@@ -186,6 +206,20 @@ impl Demo {
         Ok(Run { name, pictures, render, converted: None })
     }
 
+    /// Every frame by a textbook's table of footprints.
+    fn textbook(&self, colours: &TransferFunction) -> Result<Run> {
+        let mut source = self.source()?;
+        let grid = source.archive().grid;
+        let colour = |sample: f32| colours.colour(sample.into()).unwrap_or_default().map(|c| c as f32);
+        let (mut pictures, splatter) = (Vec::new(), Splatter::new(&grid, &self.view(), self.kernel(&grid)?, CUT)?);
+        let clock = Instant::now();
+        textbook::render(source.as_mut(), FRAMES, &splatter, colour, &mut |_, picture| {
+            pictures.extend_from_slice(picture.as_flattened());
+        })?;
+        let render = RenderReport { splat_seconds: clock.elapsed().as_secs_f64(), ..RenderReport::default() };
+        Ok(Run { name: "conventional", pictures, render, converted: None })
+    }
+
     fn by_coefficients(
         &self,
         name: &'static str,
@@ -209,13 +243,20 @@ impl Demo {
         Ok(Run { name, pictures, render, converted: Some((report, compared)) })
     }
 
-    /// All frames of a scene, seen from above, where the magnet passes.
-    fn pictures(&self, scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
-        let view = View { azimuth: 0.0, elevation: 90.0, roll: 0.0, size: self.size, scale: None, center: None };
+    /// Seen from above, where the magnet passes.
+    fn view(&self) -> View {
+        View { azimuth: 0.0, elevation: 90.0, roll: 0.0, size: self.size, scale: None, center: None }
+    }
+
+    fn kernel(&self, grid: &Grid) -> Result<Kernel> {
         let thickness = self.plate.spacing * self.plate.dims[2] as f64;
-        let tau = 1.0 / (ATTENUATION * thickness);
-        let kernel = Kernel::new(None, tau, scene.grid())?;
-        let config = RenderConfig { kernel, splat_error: SPLAT_ERROR, ..RenderConfig::new(scene, view) };
+        Kernel::new(None, 1.0 / (ATTENUATION * thickness), grid)
+    }
+
+    /// All frames of a scene.
+    fn pictures(&self, scene: &mut dyn Scene) -> Result<(Vec<f32>, RenderReport)> {
+        let kernel = self.kernel(scene.grid())?;
+        let config = RenderConfig { kernel, splat_error: SPLAT_ERROR, ..RenderConfig::new(scene, self.view()) };
         pictures(scene, &config)
     }
 }
@@ -231,14 +272,17 @@ mod tests {
         let plate = Plate { dims: [38, 38, 11], spacing: 4e-3, ..Plate::default() };
         let demo = Demo { folder: folder.path().into(), plate, size: [72, 48] };
         let mut said = 0;
-        let [runs, plain] = demo.experiment(&mut |_| said += 1).unwrap();
-        assert_eq!(said, 7, "the solver, and three methods twice");
-        let table = table::text(&demo, &runs, &plain);
+        let experiment = demo.experiment(&mut |_| said += 1).unwrap();
+        assert_eq!(said, 8, "the solver, three methods twice, and the textbook's");
+        let table = table::text(&demo, &experiment);
+        let Experiment { coloured: runs, textbook, .. } = experiment;
         assert!(table.contains("399.3") && table.contains("1643.0"), "{table}");
         let file = std::io::BufReader::new(fs::File::open(demo.figure()).unwrap());
         let info = png::Decoder::new(file).read_info().unwrap().info().size();
         assert!(info.0 as usize > 4 * 72 && info.1 as usize > 5 * 48, "{info:?}");
         assert!(runs.iter().all(|run| run.pictures.len() == FRAMES * 72 * 48 * 3));
+        let apart = Differences::of(&textbook.pictures, &runs[0].pictures);
+        assert!(apart.rms() < Some(0.01), "both conventional methods draw the same: {apart:?}");
         for run in &runs[1..] {
             let (report, compared) = run.converted.as_ref().unwrap();
             assert!((report.delta - TOLERANCE).abs() < 1e-9, "of full brightness: {}", report.delta);

@@ -1,6 +1,6 @@
 //! Table 1 compared with that of [Dobashi](wavesplat::bibliography), with file sizes and errors, which the paper does not give.
 
-use super::{Demo, FRAMES, Run, TOLERANCE};
+use super::{Demo, Experiment, FRAMES, Run, TOLERANCE};
 use std::fmt::Write as _;
 
 /// The paper's measurements of a method.
@@ -24,40 +24,50 @@ const PAPER: [Paper; 3] = [
     Paper { name: "conventional", seconds: None, total: 1643.0 },
 ];
 
-/// The tables of runs with three channels and with one. The first run of each is the conventional method.
-pub(super) fn text(demo: &Demo, coloured: &[Run], plain: &[Run]) -> String {
+/// All tables.
+pub(super) fn text(demo: &Demo, experiment: &Experiment) -> String {
+    let Experiment { coloured, plain, textbook } = experiment;
     let [width, height] = demo.size;
+    let by_coefficients = &coloured[1..];
     let mut text = format!(
-        "Table 1: {FRAMES} frames of {width}x{height} pixels, coloured before the transform, tolerance {TOLERANCE} (seconds)\n\n\
-         {:14}{:^49}{:^48}\n",
-        "", "here", "in the paper"
+        "Table 1: {FRAMES} frames of {width}x{height} pixels, coloured before the transform, tolerance {TOLERANCE} (seconds)\n\n"
     );
+    text += "The paper's comparison: the conventional method adds a table's footprint for every voxel and frame\n\n";
+    text += &first_view(by_coefficients, textbook);
+    text += &further_view(by_coefficients, textbook);
+    text += "\nThe same lattice, which is faster than footprints, for all methods\n\n";
+    text += &first_view(by_coefficients, &coloured[0]);
+    text += &further_view(by_coefficients, &coloured[0]);
+    text + &sizes(coloured, plain) + NOTES
+}
+
+/// The paper's rows, each with the run of that method.
+fn rows<'a>(by_coefficients: &'a [Run], conventional: &'a Run) -> impl Iterator<Item = (&'static Paper, &'a Run)> {
+    let run = move |paper: &Paper| by_coefficients.iter().chain([conventional]).find(|run| run.name == paper.name);
+    PAPER.iter().filter_map(move |paper| Some((paper, run(paper)?)))
+}
+
+/// The times of a first view: with the transform.
+fn first_view(by_coefficients: &[Run], conventional: &Run) -> String {
     let columns = format!("{:>9}{:>11}{:>9}{:>9}{:>8}", "transform", "splatting", "inverse", "total", "ratio");
-    let _ = writeln!(text, "{:14}{columns}   {columns}", "");
-    for paper in &PAPER {
-        if let Some(run) = coloured.iter().find(|run| run.name == paper.name) {
-            let here = cells(Some(run.seconds()), run.total(), coloured[0].total(), 3);
-            let there = cells(paper.seconds, paper.total, PAPER[2].total, 1);
-            let _ = writeln!(text, "{:14}{here}   {there}", run.name);
-        }
+    let mut text = format!("{:14}{:^49}{:^48}\n{:14}{columns}   {columns}\n", "", "here", "in the paper", "");
+    for (paper, run) in rows(by_coefficients, conventional) {
+        let here = cells(Some(run.seconds()), run.total(), conventional.total(), 3);
+        let there = cells(paper.seconds, paper.total, PAPER[2].total, 1);
+        let _ = writeln!(text, "{:14}{here}   {there}", run.name);
     }
-    text + &views(coloured) + &sizes(coloured, plain) + NOTES
+    text
 }
 
 /// The same for a further view: without the transform.
-fn views(coloured: &[Run]) -> String {
+fn further_view(by_coefficients: &[Run], conventional: &Run) -> String {
     let columns = format!("{:>9}{:>8}", "seconds", "ratio");
-    let mut text = format!(
-        "\nEach further view, from the file\n\n{:14}{:^17}   {:^17}\n{:14}{columns}   {columns}\n",
-        "", "here", "in the paper", ""
-    );
+    let mut text = format!("\n{:14}{columns}   {columns}\n", "further views");
     let cells = |view: f64, conventional: f64, places: usize| format!("{view:>9.places$}{:>8.1}", conventional / view);
-    for paper in &PAPER {
-        if let Some(run) = coloured.iter().find(|run| run.name == paper.name) {
-            let here = cells(run.view(), coloured[0].view(), 3);
-            let there = cells(paper.view(), PAPER[2].view(), 1);
-            let _ = writeln!(text, "{:14}{here}   {there}", run.name);
-        }
+    for (paper, run) in rows(by_coefficients, conventional) {
+        let here = cells(run.view(), conventional.view(), 3);
+        let there = cells(paper.view(), PAPER[2].view(), 1);
+        let _ = writeln!(text, "{:14}{here}   {there}", run.name);
     }
     text
 }
@@ -109,9 +119,8 @@ fn size(run: &Run, truth: &Run) -> String {
 }
 
 const NOTES: &str = "
-A ratio above 1 is faster than the conventional method, which draws frame by frame. The ratios of the totals are smaller
-than in the paper because both methods here use the same fast splatting: it saves less than the transform takes. A
-further view needs no transform. The inverse also turns sums into pixels; for the conventional method it does only this.
-The time for the sums of weights, equal for both methods, is not counted. Coefficients of three channels are counted
-together. One channel gets its colours after projection, so other colours need no new conversion.
+A ratio above 1 is faster than the conventional method, which draws frame by frame. A further view needs no transform.
+The inverse also turns sums into pixels; for the lattice's conventional method it does only this. The time for the sums
+of weights, equal for both methods of the lattice, is not counted. Coefficients of three channels are counted together.
+One channel gets its colours after projection, so other colours need no new conversion.
 ";

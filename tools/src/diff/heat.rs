@@ -3,19 +3,18 @@
 use super::load::Stack;
 use super::measure::{largest, of_pixels};
 use super::report::number;
-use crate::sheet::{GAP, Image, Rgb, contact_sheet, difference_colour, heat, titled, with_bar};
+use crate::sheet::{Image, Style, difference_colour, heat};
 use std::path::Path;
 use wavesplat::base::error::Result;
 use wavesplat_core::base::output::Output;
 
+const STYLE: Style = Style::LIGHT;
 /// The largest number of frames shown.
 const SHOWN: usize = 16;
 /// The largest number of pixels of all shown frames; larger pictures are shrunk.
 const PIXELS: usize = 1 << 26;
-const PAPER: Rgb = [40; 3];
-const INK: Rgb = [255; 3];
 
-/// Draws |A - B| of up to 16 frames evenly spread, red where it is `scale` or more, as one PNG.
+/// Draws |A - B| of up to 16 frames evenly spread, dark red where it is `scale` or more, as one PNG.
 ///
 /// # Errors
 /// Frames cannot be read, or the file cannot be written.
@@ -24,13 +23,13 @@ pub(super) fn draw(a: &Stack, b: &Stack, scale: f64, (path, force): (&Path, bool
     let step = shrinking(frames.len() * a.shape.width * a.shape.height);
     let picture = |frame: &usize| {
         let image = map(&of_pixels(&a.read(*frame)?, &b.read(*frame)?, a.shape.channels), a.shape.width, step, scale);
-        Ok(if a.shape.frames == 1 { image } else { titled(&image, &[&format!("frame {frame}")], INK, PAPER) })
+        Ok(if a.shape.frames == 1 { image } else { STYLE.titled(&image, &[format!("frame {frame}")]) })
     };
     let pictures = frames.iter().map(picture).collect::<Result<Vec<_>>>()?;
-    let sheet = contact_sheet(&pictures, columns(pictures.len()), GAP, PAPER);
+    let sheet = STYLE.contact_sheet(&pictures, columns(pictures.len()));
     let mut out = Output::create(path, force)?;
-    let labels = [format!(">={}", number(scale)), "|A-B|".into(), "0".into()];
-    with_bar(&sheet, &labels, INK, PAPER, difference_colour).write_png(&mut out)?;
+    let labels = [format!("{} or more", number(scale)), "|A − B|".into(), "0".into()];
+    STYLE.with_bar(&sheet, &labels, difference_colour).write_png(&mut out)?;
     out.commit()
 }
 
@@ -77,7 +76,7 @@ mod tests {
         differences[14] = Some(2.0);
         let image = map(&differences, 5, 2, 2.0);
         assert_eq!((image.width, image.height), (3, 2));
-        let (blue, red) = (difference_colour(0.0), difference_colour(1.0));
-        assert_eq!(image.pixels, [blue, blue, blue, blue, blue, red]);
+        let (none, most) = (difference_colour(0.0), difference_colour(1.0));
+        assert_eq!(image.pixels, [none, none, none, none, none, most]);
     }
 }

@@ -11,13 +11,14 @@ mod title;
 mod volume;
 
 pub use layout::{Margins, Parts, margins};
+pub use text::Letters;
 pub use ticks::round_values;
 pub use volume::{AxisLabels, VolumeAxes};
 
 use crate::render::ViewReport;
 use canvas::{Canvas, Rectangle, over};
 use layout::{BAR, has_axes, has_bar, has_time};
-use text::{Letters, shortened};
+use text::shortened;
 use title::Title;
 use wavesplat_core::base::time_labels::TimeLabels;
 use wavesplat_core::colour::{Rgb, Scale};

@@ -7,7 +7,7 @@ const FONT: &[u8] = include_bytes!("font.ttf");
 
 /// Letters of one size.
 #[derive(Debug, Clone)]
-pub(super) struct Letters {
+pub struct Letters {
     font: PxScaleFont<FontRef<'static>>,
     /// The height of a line in pixels.
     pub(super) size: f64,
@@ -15,7 +15,7 @@ pub(super) struct Letters {
 
 impl Letters {
     /// Letters for lines of `size` pixels.
-    pub(super) fn new(size: f64) -> Self {
+    pub fn new(size: f64) -> Self {
         let font = FontRef::try_from_slice(FONT).unwrap_or_else(|_| unreachable!("the program's own font"));
         Self { font: font.into_scaled(size as f32), size }
     }
@@ -26,12 +26,12 @@ impl Letters {
     }
 
     /// The width of a text in pixels.
-    pub(super) fn width(&self, text: &str) -> f64 {
+    pub fn width(&self, text: &str) -> f64 {
         text.chars().map(|letter| f64::from(self.font.h_advance(self.font.glyph_id(known(letter))))).sum()
     }
 
     /// Calls `put(x, y, share)` for all pixels of a text whose middle is at `middle`.
-    pub(super) fn draw(&self, text: &str, middle: [f64; 2], mut put: impl FnMut(i64, i64, f64)) {
+    pub fn draw(&self, text: &str, middle: [f64; 2], mut put: impl FnMut(i64, i64, f64)) {
         let (mut x, half) =
             (middle[0] - self.width(text) / 2.0, f64::from(self.font.ascent() + self.font.descent()) / 2.0);
         for letter in text.chars() {
