@@ -52,11 +52,10 @@ struct Panel {
 }
 
 /// From left to right, over time.
-const PANELS: [Panel; 4] = [
+const PANELS: [Panel; 3] = [
     Panel { title: "composite", options: "--mode composite --shade --transfer-function magma", time: 0.45 },
     Panel { title: "surfaces", options: "--iso 20%,60%", time: 0.6 },
     Panel { title: "slices", options: "--mode slice --slice x=50% --slice y=50% --colormap inferno", time: 0.75 },
-    Panel { title: "mean", options: "--colormap viridis", time: 0.9 },
 ];
 const BANNER: Style = Style { line: 30, ink: [235; 3], paper: [16; 3] };
 
