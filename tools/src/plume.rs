@@ -220,8 +220,8 @@ mod tests {
     #[test]
     fn projection_takes_divergence_away() {
         let mut flow = Flow::new(DIMS);
-        let wave = |n: usize, at: [usize; 3]| (n as f32 + 0.2 * at[n] as f32 * at[(n + 1) % 3] as f32).sin();
-        flow.velocity = [0, 1, 2].map(|n| each(DIMS, |at| wave(n, at)));
+        let squared = |at: [usize; 3]| (0..3).map(|a| (at[a] as f32 - DIMS[a] as f32 / 2.0).powi(2)).sum::<f32>();
+        flow.velocity[2] = each(DIMS, |at| (-squared(at) / 18.0).exp()); // a jet
         let rough = |flow: &Flow| {
             let divergence =
                 |at: [usize; 3]| (0..3).map(|axis| slope(DIMS, &flow.velocity[axis], at, axis)).sum::<f32>();
