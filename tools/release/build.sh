@@ -85,18 +85,18 @@ pack() {
         -C "$(dirname "$1")" -cf - "$(basename "$1")" | gzip -n >"$out/$(basename "$1").tar.gz"
 }
 
-# Programs in the folder wavesplat.data/scripts are put among the commands of the environment that the wheel is installed to.
+# pip puts the files of the wheel's folder of scripts among the commands of the environment.
 wheel() {
     build_programs
-    local python=target/release-python scripts=tools/python/wavesplat.data/scripts linux=(--zig --compatibility manylinux2014)
+    local python=target/release-python linux=(--zig --compatibility manylinux2014)
     [ "$profile" = release ] || linux=(--compatibility linux)
-    python3 -m venv "$python" && "$python/bin/pip" install --quiet "maturin>=1.9,<2" ziglang ||
-        missing "the wheel needs maturin and ziglang, which pip cannot install here"
-    mkdir -p "$scripts"
-    trap 'rm -rf tools/python/wavesplat.data' EXIT
-    install -s "$programs/wavesplat" "$programs/wavesplat-render" "$scripts"
+    python3 -m venv "$python" && "$python/bin/pip" install --quiet "maturin>=1.9,<2" wheel ziglang ||
+        missing "the wheel needs maturin, wheel and ziglang, which pip cannot install here"
     PATH="$PWD/$python/bin:$PATH" CARGO_TARGET_DIR="$PWD/target" "$python/bin/maturin" build --quiet --locked --strip \
-        --profile "$profile" --features "$features" "${linux[@]}" --manifest-path tools/python/Cargo.toml --out "$out"
+        --profile "$profile" --features "$features" "${linux[@]}" --manifest-path tools/python/Cargo.toml --out "$work/wheel"
+    "$python/bin/python" -m wheel unpack --dest "$work/wheel" "$work"/wheel/*.whl
+    install -D -s -t "$work/wheel/$name/$name.data/scripts" "$programs/wavesplat" "$programs/wavesplat-render"
+    "$python/bin/python" -m wheel pack --dest-dir "$out" "$work/wheel/$name"
 }
 
 sources() {
@@ -104,8 +104,8 @@ sources() {
     git rev-parse HEAD >/dev/null || missing "the sources need git and a repository"
     mkdir -p "$folder/.cargo"
     git archive HEAD | tar -x -C "$folder"
-    (cd "$folder" && cargo vendor --quiet --locked vendor >.cargo/config.toml) ||
-        missing "the sources need all crates, which cargo cannot download here"
+    (cd "$folder" && cargo vendor --locked vendor >.cargo/config.toml 2>../vendor.log) ||
+        missing "the sources need all crates, which cargo cannot download here: $(tail -1 "$work/vendor.log")"
     pack "$folder"
 }
 
