@@ -9,7 +9,7 @@ from maturin import get_requires_for_build_wheel as _for_wheel
 
 def _need_rust() -> None:
     if shutil.which("cargo") is None:
-        raise SystemExit("wavesplat: to build this package, install Rust 1.95 or later (https://rustup.rs) and a C compiler")
+        raise SystemExit("wavesplat: to build this package, install Rust (https://rustup.rs) and a C compiler")
 
 
 def get_requires_for_build_wheel(config_settings=None):

@@ -295,7 +295,7 @@ fn a_png_that_claims_more_than_it_can_hold_is_refused() {
 }
 
 #[test]
-fn the_heat_map_runs_from_blue_to_red_with_a_bar() {
+fn the_heat_map_runs_from_white_to_dark_red_with_a_bar() {
     let folder = Folder::new();
     let (mut values, mut other) = (floats(20), floats(20));
     (values[0], other[0], other[1]) = (NAN, NAN, NAN);
@@ -307,17 +307,18 @@ fn the_heat_map_runs_from_blue_to_red_with_a_bar() {
     let draw = |args: &[&str]| json(&a, &b, &[&["-o", heat.to_str().unwrap()], args].concat());
     assert!((draw(&[])["heat_map"]["scale"].as_f64().unwrap() - 0.5).abs() < 1e-12);
     let ([width, height], pixels) = picture(&heat);
-    let (gap, band) = (4, 12);
+    let (gap, band) = (5, 16 + 5);
+    let (background, none, half, most) = ([224; 3], [255; 3], [252, 150, 60], [128, 0, 38]);
     assert!(width as usize > 4 * (WIDTH + gap) && height as usize == gap + 4 * (HEIGHT + band + gap));
     let at = |pixels: &[[u8; 3]], x: usize, y: usize| pixels[(gap + band + y) * width as usize + gap + x];
-    assert_eq!((at(&pixels, 0, 0), at(&pixels, 1, 0), at(&pixels, 5, 5)), ([0; 3], [255, 0, 0], [0, 0, 255]));
-    assert_eq!((at(&pixels, 2, 1), at(&pixels, 3, 1)), ([0, 255, 0], [255, 0, 0]));
+    assert_eq!((at(&pixels, 0, 0), at(&pixels, 1, 0), at(&pixels, 5, 5)), (background, most, none));
+    assert_eq!((at(&pixels, 2, 1), at(&pixels, 3, 1)), (half, most));
     refused(&a, &b, &["-o", heat.to_str().unwrap()], 2, "--force");
     draw(&["--scale", "1", "--force"]);
-    assert_eq!(at(&picture(&heat).1, 3, 1), [0, 255, 0]);
+    assert_eq!(at(&picture(&heat).1, 3, 1), half);
     let one = folder.grey("one.png", &texture(1));
     assert!(diff(&one, &one, &["-o", heat.to_str().unwrap(), "--force"]).status.success());
-    assert_eq!(picture(&heat).1[4 * picture(&heat).0[0] as usize + 4], [0, 0, 255], "a picture has no name above");
+    assert_eq!(picture(&heat).1[gap * picture(&heat).0[0] as usize + gap], none, "a picture has no name above");
 }
 
 #[test]
