@@ -306,16 +306,19 @@ fn the_heat_map_runs_from_white_to_dark_red_with_a_bar() {
     let heat = folder.path("heat.png");
     let draw = |args: &[&str]| json(&a, &b, &[&["-o", heat.to_str().unwrap()], args].concat());
     assert!((draw(&[])["heat_map"]["scale"].as_f64().unwrap() - 0.5).abs() < 1e-12);
-    let ([width, height], pixels) = picture(&heat);
+    let drawn = picture(&heat);
+    let [width, height] = drawn.0;
     let (gap, band) = (5, 16 + 5);
     let (background, none, half, most) = ([224; 3], [255; 3], [252, 150, 60], [128, 0, 38]);
     assert!(width as usize > 4 * (WIDTH + gap) && height as usize == gap + 4 * (HEIGHT + band + gap));
-    let at = |pixels: &[[u8; 3]], x: usize, y: usize| pixels[(gap + band + y) * width as usize + gap + x];
-    assert_eq!((at(&pixels, 0, 0), at(&pixels, 1, 0), at(&pixels, 5, 5)), (background, most, none));
-    assert_eq!((at(&pixels, 2, 1), at(&pixels, 3, 1)), (half, most));
+    let at = |drawn: &([u32; 2], Vec<[u8; 3]>), x: usize, y: usize| {
+        drawn.1[(gap + band + y) * drawn.0[0] as usize + gap + x]
+    };
+    assert_eq!((at(&drawn, 0, 0), at(&drawn, 1, 0), at(&drawn, 5, 5)), (background, most, none));
+    assert_eq!((at(&drawn, 2, 1), at(&drawn, 3, 1)), (half, most));
     refused(&a, &b, &["-o", heat.to_str().unwrap()], 2, "--force");
     draw(&["--scale", "1", "--force"]);
-    assert_eq!(at(&picture(&heat).1, 3, 1), half);
+    assert_eq!(at(&picture(&heat), 3, 1), half);
     let one = folder.grey("one.png", &texture(1));
     assert!(diff(&one, &one, &["-o", heat.to_str().unwrap(), "--force"]).status.success());
     assert_eq!(picture(&heat).1[gap * picture(&heat).0[0] as usize + gap], none, "a picture has no name above");
