@@ -4,28 +4,30 @@
 # Usage: test.sh PROGRAMS OUT [OPTIONS of build.sh]
 set -euo pipefail
 
-cd "$(dirname "$0")/../.."
-programs=$1
-out=$2
-shift 2
-rm -rf "$out"
-tools/release/build.sh -o "$out" --programs "$programs" "$@" >/dev/null
+here=$(realpath "$(dirname "$0")")
+out=$(realpath -m "$2")
+"$here/build.sh" -o "$out" --programs "$1" "${@:3}" >/dev/null
+unpacked=$(mktemp -d)
+trap 'rm -rf "$unpacked"' EXIT
+
 cd "$out"
 sha256sum --check --quiet SHA256SUMS
 [ "$(wc -l <SHA256SUMS)" = 3 ]
+for file in *.tar.gz; do
+    tar -xzf "$file" -C "$unpacked"
+done
 
-tar -xzf wavesplat-*-linux.tar.gz
-cd wavesplat-*-linux
+cd "$unpacked"/wavesplat-*-linux
 for program in wavesplat wavesplat-render; do
     "./$program" --version
-    grep -q "$program" "completions/$program.bash" "man/$program.1"
+    for file in "man/$program.1" "completions/$program".{bash,zsh,fish}; do
+        grep -q "$program" "$file"
+    done
 done
-[ -s README.md ] && [ -s LICENSE-MIT ] && [ -s LICENSE-APACHE ]
-cd ..
+for file in README.md LICENSE-MIT LICENSE-APACHE font-licence.txt; do
+    [ -s "$file" ]
+done
 
 # All crates that any feature needs are there, with their checksums.
-tar -xzf wavesplat-*-source.tar.gz
-cd wavesplat-*-source
-CARGO_HOME=$(mktemp -d) cargo metadata --offline --locked --all-features --format-version 1 >/dev/null
-cd ..
-rm -rf wavesplat-*-linux wavesplat-*-source
+cd "$unpacked"/wavesplat-*-sources
+CARGO_HOME=$unpacked/cargo cargo metadata --offline --locked --all-features --format-version 1 >/dev/null
