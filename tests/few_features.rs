@@ -11,16 +11,16 @@ const CONVERTER: &str = env!("CARGO_BIN_EXE_wavesplat");
 const RENDERER: &str = env!("CARGO_BIN_EXE_wavesplat-render");
 
 /// Runs a program in a folder.
-fn run(folder: &Path, program: &str, words: &str) -> Output {
-    Command::new(program).args(words.split(' ')).current_dir(folder).output().unwrap()
+fn run(folder: &Path, program: &str, words: &[&str]) -> Output {
+    Command::new(program).args(words).current_dir(folder).output().unwrap()
 }
 
 /// Expects an exit code and words of the message.
-fn fails(folder: &Path, program: &str, words: &str, code: i32, parts: &[&str]) {
+fn fails(folder: &Path, program: &str, words: &[&str], code: i32, parts: &[&str]) {
     let Output { status, stderr, .. } = run(folder, program, words);
     let message = String::from_utf8(stderr).unwrap();
-    assert_eq!(status.code(), Some(code), "{words}: {message}");
-    assert!(parts.iter().all(|part| message.contains(part)), "{words}: {message}");
+    assert_eq!(status.code(), Some(code), "{words:?}: {message}");
+    assert!(parts.iter().all(|part| message.contains(part)), "{words:?}: {message}");
 }
 
 /// A file of 8 frames of 4 x 4 x 4 voxels, `a.wspl`, and nothing else.
@@ -28,7 +28,8 @@ fn folder_with_file() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let samples: Vec<u8> = (0..8_u16 * 64).flat_map(|n| (f32::from(n) / 512.0).to_le_bytes()).collect();
     fs::write(folder.path().join("a.raw"), samples).unwrap();
-    let converted = run(folder.path(), CONVERTER, "convert a.raw --dims 4x4x4x8 --dtype f32 -o a.wspl");
+    let words = ["convert", "a.raw", "--dims", "4x4x4x8", "--dtype", "f32", "-o", "a.wspl"];
+    let converted = run(folder.path(), CONVERTER, &words);
     assert!(converted.status.success(), "{converted:?}");
     fs::remove_file(folder.path().join("a.raw")).unwrap();
     folder
@@ -46,7 +47,7 @@ fn formats_that_are_not_built_in_explain_how_to_get_them() {
     for (_, source, feature) in formats.into_iter().filter(|(is_built_in, ..)| !is_built_in) {
         let advice = format!("cargo build --release --features {feature}");
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/inputs").join(source);
-        let words = format!("convert {} -o a.wspl", source.display());
+        let words = ["convert", source.to_str().unwrap(), "-o", "a.wspl"];
         fails(folder.path(), CONVERTER, &words, 3, &["not built in", &advice]);
     }
 }
@@ -57,9 +58,19 @@ fn exr_without_its_feature_explains_how_to_get_it() {
         return;
     }
     let (folder, advice) = (folder_with_file(), "cargo build --release --features exr");
-    let fails = |words: &str, parts: &[&str]| fails(folder.path(), RENDERER, words, 2, parts);
-    fails("a.wspl -o p_%d.exr", &["p_%d.exr", advice]);
-    fails("a.wspl -o - --format exr", &[advice]);
-    fails("a.wspl -o v.npy --error-image e_%d.exr", &["e_%d.exr", advice]);
+    let fails = |words: &[&str], parts: &[&str]| fails(folder.path(), RENDERER, words, 2, parts);
+    fails(&["a.wspl", "-o", "p_%d.exr"], &["p_%d.exr", advice]);
+    fails(&["a.wspl", "-o", "-", "--format", "exr"], &[advice]);
+    fails(&["a.wspl", "-o", "v.npy", "--error-image", "e_%d.exr"], &["e_%d.exr", advice]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is written");
+}
+
+#[test]
+fn remote_files_without_their_feature_explain_how_to_get_it() {
+    if cfg!(feature = "remote") {
+        return;
+    }
+    let (folder, advice) = (tempfile::tempdir().unwrap(), "cargo build --release --features remote");
+    let words = ["info", "https://example.org/a.wspl"];
+    fails(folder.path(), CONVERTER, &words, 3, &["https://example.org/a.wspl", "not built in", advice]);
 }

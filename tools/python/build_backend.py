@@ -1,4 +1,4 @@
-"""Builds the package by maturin, and says what is missing before anything is downloaded or built."""
+"""Builds the package by maturin, which would download Rust where it is missing: says so instead."""
 
 import shutil
 
