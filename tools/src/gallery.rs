@@ -3,7 +3,7 @@
 
 use crate::demo::{self, FRAMES};
 use crate::eddy::Plate;
-use crate::output::{Format, Shape, Target};
+use crate::output::{Format, Target};
 use crate::plume::plume;
 use crate::scenes::{MEMORY, converted};
 use crate::sheet::{Image, Style};
@@ -13,11 +13,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::progress::Silent;
-use wavesplat::base::sample::SampleType;
 use wavesplat::base::values::Numbers;
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat_cli::{InputArgs, render};
-use wavesplat_core::base::output::Output;
 use wavesplat_jobs::picture::{Caller, run};
 
 /// The default archives.
@@ -26,8 +24,8 @@ pub const USUAL: [&str; 1] = ["plume"];
 pub const SIDE: usize = 440;
 /// Tolerance of all conversions.
 const TOLERANCE: f64 = 1e-3;
-/// Voxels and frames of the plume.
-const PLUME: Shape = Shape { dims: [64, 64, 80], frames: 64, ty: SampleType::F32 };
+/// Voxels along x, y and z of the plume, and its frames.
+const PLUME: [usize; 4] = [64, 64, 80, 64];
 /// The share of an archive's frames after which pictures are taken.
 const LATE: f64 = 0.75;
 /// The options of the gallery's pictures.
@@ -39,7 +37,7 @@ const PICTURES: [&str; 8] = [
     "--iso 30%,70%",
     "--mode slice --slice x=50% --slice y=50% --slice z=50%",
     "--mode composite --opacity 0:0,0.2:0.1,0.3:0,0.6:0,0.7:0.6,0.8:0,1:1",
-    "--norm log --colormap plasma",
+    "--view top --colormap plasma",
 ];
 const GALLERY: Style = Style { line: 18, ..Style::LIGHT };
 
@@ -101,12 +99,12 @@ impl Gallery {
             let archive = self.converted(archive, name, say)?;
             if sheets.is_empty() {
                 say("drawing the banner");
-                write(&self.banner_of(&archive)?, &self.banner())?;
+                self.banner_of(&archive)?.save(&self.banner(), true)?;
             }
             say(&format!("drawing {name}"));
             sheets.push(self.pictures(&archive)?);
         }
-        write(&GALLERY.stacked(&sheets), &self.sheet())
+        GALLERY.stacked(&sheets).save(&self.sheet(), true)
     }
 
     /// The base name of each archive's files.
@@ -128,7 +126,9 @@ impl Gallery {
             "plume" => {
                 say("computing a plume");
                 let file = frames.with_extension("npy");
-                write_plume(&file)?;
+                let [x, y, z, frames] = PLUME;
+                let plume = plume([x, y, z], frames);
+                Target::File(file.clone(), Format::Npy).write_f32([x, y, z], frames, plume)?;
                 (file, own)
             }
             "demo" => {
@@ -163,11 +163,13 @@ impl Gallery {
 
     /// A row of pictures over time.
     fn banner_of(&self, archive: &Archive) -> Result<Image> {
+        let [r, g, b] = BANNER.paper;
         let mut pictures = Vec::new();
         for Panel { title, options, time } in &PANELS {
             let frame = (time * archive.frames as f64) as usize;
             let size = format!("{}x{}", self.side, self.side * 4 / 3);
-            let options = format!("{options} --frames {frame} --size {size} --annotate=box --background #101010");
+            let background = format!("--background #{r:02x}{g:02x}{b:02x}");
+            let options = format!("{options} --frames {frame} --size {size} --annotate=box {background}");
             pictures.push(BANNER.titled(&self.picture(archive, &options)?, &[format!("{title}, frame {frame}")]));
         }
         Ok(BANNER.contact_sheet(&pictures, PANELS.len()))
@@ -180,23 +182,10 @@ impl Gallery {
         words.extend(options.split(' ').map(Into::into));
         let parsed = render::parsed(words)?;
         run(&parsed.session, &parsed.request, &Caller(&Silent))?;
-        Image::read_png(&path)
+        let picture = Image::read_png(&path)?;
+        fs::remove_file(&path).map_err(|e| Error::io(&path, "removing", e))?;
+        Ok(picture)
     }
-}
-
-fn write(image: &Image, path: &Path) -> Result<()> {
-    let mut out = Output::create(path, true)?;
-    image.write_png(&mut out)?;
-    out.commit()
-}
-
-/// Writes the plume's frames.
-fn write_plume(path: &Path) -> Result<()> {
-    let mut frames = plume(PLUME.dims, PLUME.frames);
-    Target::File(path.into(), Format::Npy).write(&PLUME, |_, bytes| {
-        let values = frames.next().into_iter().flatten();
-        bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(b, v)| *b = v.to_le_bytes());
-    })
 }
 
 /// The base name of an archive's files.
@@ -209,8 +198,10 @@ fn name(archive: &str) -> String {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::output::Shape;
     use crate::sheet::Rgb;
     use crate::synth::{Kind, Synth};
+    use wavesplat::base::sample::SampleType;
 
     fn gallery(folder: &Path, archives: Vec<String>) -> Gallery {
         Gallery { archives, input: plain(), folder: folder.into(), side: 40 }
@@ -235,13 +226,13 @@ mod tests {
             Target::File(path.clone(), Format::Npy).write(&shape, |f, bytes| synth.fill(f, bytes)).unwrap();
             path.to_str().unwrap().to_string()
         };
-        let archives = vec![archive(Kind::Smooth, "above.npy"), archive(Kind::Moving, "moving.npy")];
+        let archives = vec![archive(Kind::Smooth, "above.npy"), archive(Kind::Oscillating, "signed.npy")];
         let gallery = gallery(&folder.path().join("out"), archives);
         let mut said = Vec::new();
         gallery.draw(&mut |text| said.push(text.to_string())).unwrap();
         assert_eq!(
             said,
-            ["converting above", "drawing the banner", "drawing above", "converting moving", "drawing moving"]
+            ["converting above", "drawing the banner", "drawing above", "converting signed", "drawing signed"]
         );
         let (sheet, gap) = (Image::read_png(&gallery.sheet()).unwrap(), GALLERY.gap());
         assert!(sheet.width == gap + 4 * (40 + gap) && sheet.height > 4 * 40, "{} {}", sheet.width, sheet.height);

@@ -78,10 +78,10 @@ struct Demo {
 
 #[derive(Args)]
 struct GalleryArgs {
-    /// Archives, one name each: demo, a kind of synthetic archive, or frames as wavesplat convert takes them
+    /// Archives, one name each: plume, demo, or frames as wavesplat convert takes them
     #[arg(value_name = "ARCHIVE", default_values = gallery::USUAL)]
     archives: Vec<String>,
-    /// The folder of gallery.png and the coefficient files
+    /// The folder of gallery.png, banner.png and the coefficient files
     #[arg(short, long, value_name = "DIR", default_value = "gallery-output")]
     output: PathBuf,
     #[command(flatten)]
@@ -322,7 +322,7 @@ fn gallery(args: &GalleryArgs) -> Result<()> {
     let GalleryArgs { archives, output, input } = args;
     let all = Gallery { archives: archives.clone(), input: input.clone(), folder: output.clone(), side: gallery::SIDE };
     all.draw(&mut |step| say(&format!("{step} ...")))?;
-    wavesplat_cli::print(&format!("{}\n", all.sheet().display()))
+    wavesplat_cli::print(&format!("{}\n{}\n", all.sheet().display(), all.banner().display()))
 }
 
 fn synth(args: &SynthArgs) -> Result<()> {

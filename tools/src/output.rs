@@ -77,6 +77,14 @@ impl Target {
         format.or(of_name).ok_or_else(unclear).map(|f| Self::File(path, f))
     }
 
+    /// Writes an archive of f32 frames.
+    pub fn write_f32(&self, dims: [usize; 3], frames: usize, mut values: impl Iterator<Item = Vec<f32>>) -> Result<()> {
+        self.write(&Shape { dims, frames, ty: SampleType::F32 }, |_, bytes| {
+            let frame = values.next().into_iter().flatten();
+            bytes.as_chunks_mut().0.iter_mut().zip(frame).for_each(|(b, v)| *b = v.to_le_bytes());
+        })
+    }
+
     /// Writes an archive; `fill` supplies the frames one after another. A reader of standard output that stops early
     /// is no error.
     pub fn write(&self, shape: &Shape, fill: impl FnMut(usize, &mut [u8])) -> Result<()> {

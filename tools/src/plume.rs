@@ -58,21 +58,20 @@ impl Flow {
         self.emit();
         self.accelerate();
         self.project();
-        let (dims, velocity) = (self.dims, &self.velocity);
-        let moved = |field: &Field| transported(dims, field, velocity);
-        let (next, smoke) = ([0, 1, 2].map(|axis| moved(&velocity[axis])), moved(&self.smoke));
-        (self.velocity, self.smoke) = (next, smoke);
+        let dims = self.dims;
+        let [from, to] = [-DT, DT].map(|dt| each(dims, |at| place(dims, &self.velocity, at, dt)));
+        for field in self.velocity.iter_mut().chain([&mut self.smoke]) {
+            *field = transported(dims, field, &from, &to);
+        }
         self.steps += 1;
     }
 
     /// Fills the source with smoke.
     fn emit(&mut self) {
-        let [side, middle] = [self.dims[0].min(self.dims[1]) as f32, 0.5];
+        let side = self.dims[0].min(self.dims[1]) as f32;
         let [radius, height] = SOURCE.map(|share| share * side);
-        // A point on a circle, by the rational form of sine and cosine.
-        let t = (self.steps % 64) as f32 / 32.0 - 1.0;
-        let around = [(1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)].map(|c| WANDER * radius * c);
-        let centre = [middle * self.dims[0] as f32 + around[0], middle * self.dims[1] as f32 + around[1], height];
+        let [right, back] = on_circle(self.steps).map(|c| WANDER * radius * c);
+        let centre = [0.5 * self.dims[0] as f32 + right, 0.5 * self.dims[1] as f32 + back, height];
         let inside = |[x, y, z]: [usize; 3]| {
             let off = [x as f32 - centre[0], y as f32 - centre[1], 1.5 * (z as f32 - centre[2])];
             off.iter().map(|d| d * d).sum::<f32>() < radius * radius
@@ -84,23 +83,21 @@ impl Flow {
     /// Adds buoyancy and confinement to the velocity.
     fn accelerate(&mut self) {
         let (dims, [u, v, w]) = (self.dims, &self.velocity);
-        let curl: [Field; 3] = [
-            each(dims, |at| slope(dims, w, at, 1) - slope(dims, v, at, 2)),
-            each(dims, |at| slope(dims, u, at, 2) - slope(dims, w, at, 0)),
-            each(dims, |at| slope(dims, v, at, 0) - slope(dims, u, at, 1)),
-        ];
-        let length: Field = each(dims, |at| norm([0, 1, 2].map(|axis| curl[axis][index(dims, at)])));
-        let towards = |at: [usize; 3]| {
+        let curl = each(dims, |at| {
+            let slope = |field: &Field, axis: usize| slope(dims, field, at, axis);
+            [slope(w, 1) - slope(v, 2), slope(u, 2) - slope(w, 0), slope(v, 0) - slope(u, 1)]
+        });
+        let length: Field = curl.iter().map(|curl| norm(*curl)).collect();
+        let force = each(dims, |at| {
             let gradient = [0, 1, 2].map(|axis| slope(dims, &length, at, axis));
-            gradient.map(|g| g / (norm(gradient) + 1e-6))
-        };
-        let force = |at: [usize; 3], axis: usize| {
-            let (n, [a, b]) = (towards(at), [(axis + 1) % 3, (axis + 2) % 3]);
-            let confined = n[a] * curl[b][index(dims, at)] - n[b] * curl[a][index(dims, at)];
-            CONFINEMENT * confined + if axis == 2 { BUOYANCY * self.smoke[index(dims, at)] } else { 0.0 }
-        };
-        let next = [0, 1, 2].map(|axis| each(dims, |at| self.velocity[axis][index(dims, at)] + DT * force(at, axis)));
-        self.velocity = next;
+            let (steepness, [x, y, z]) = (norm(gradient) + 1e-6, curl[index(dims, at)]);
+            let [a, b, c] = gradient.map(|g| g / steepness);
+            let [x, y, z] = [b * z - c * y, c * x - a * z, a * y - b * x].map(|confined| CONFINEMENT * confined);
+            [x, y, z + BUOYANCY * self.smoke[index(dims, at)]]
+        });
+        for (axis, field) in self.velocity.iter_mut().enumerate() {
+            field.iter_mut().zip(&force).for_each(|(speed, force)| *speed += DT * force[axis]);
+        }
     }
 
     /// Makes the velocity free of divergence, nearly.
@@ -119,10 +116,19 @@ impl Flow {
     }
 }
 
-/// A field of the values that `value` gives for voxels.
-fn each(dims: [usize; 3], value: impl Fn([usize; 3]) -> f32 + Sync) -> Field {
+/// Where the source is on a circle of radius 1, which it goes around in twice `HALF` steps: the rational form of sine and
+/// cosine gives half of the circle, and the other half has the opposite signs.
+fn on_circle(step: usize) -> [f32; 2] {
+    const HALF: usize = 64;
+    let t = 2.0 * (step % HALF) as f32 / HALF as f32 - 1.0;
+    let sign = if (step / HALF).is_multiple_of(2) { 1.0 } else { -1.0 };
+    [1.0 - t * t, 2.0 * t].map(|c| sign * c / (1.0 + t * t))
+}
+
+/// What `value` gives for each voxel.
+fn each<T: Copy + Default + Send>(dims: [usize; 3], value: impl Fn([usize; 3]) -> T + Sync) -> Vec<T> {
     let [nx, ny, _] = dims;
-    let mut field = vec![0.0; dims.iter().product()];
+    let mut field = vec![T::default(); dims.iter().product()];
     field.par_chunks_mut(nx * ny).enumerate().for_each(|(z, slab)| {
         for (y, row) in slab.chunks_exact_mut(nx).enumerate() {
             row.iter_mut().enumerate().for_each(|(x, out)| *out = value([x, y, z]));
@@ -156,20 +162,21 @@ fn around(dims: [usize; 3], field: &Field, at: [usize; 3]) -> f32 {
     (0..3).map(|axis| neighbours(dims, field, at, axis).iter().sum::<f32>()).sum()
 }
 
-/// The field after a step along the velocity, by MacCormack's scheme: the error of a step there and back is halved and
-/// taken away, but no value leaves the range of those around the place that it comes from.
-fn transported(dims: [usize; 3], field: &Field, velocity: &[Field; 3]) -> Field {
-    let there = each(dims, |at| sample(dims, field, place(dims, velocity, at, -DT)));
-    let back = each(dims, |at| sample(dims, &there, place(dims, velocity, at, DT)));
+/// The field after a step, by MacCormack's scheme: the error of a step there and back is halved and taken away, but no
+/// value leaves the range of those around the place that it comes from. `from` and `to` are where what is at each voxel
+/// was one step before, and will be one step later.
+fn transported(dims: [usize; 3], field: &Field, from: &[[f32; 3]], to: &[[f32; 3]]) -> Field {
+    let there = each(dims, |at| sample(dims, field, from[index(dims, at)]));
+    let back = each(dims, |at| sample(dims, &there, to[index(dims, at)]));
     each(dims, |at| {
-        let around = corners(dims, field, place(dims, velocity, at, -DT));
-        let (low, high) = (around.iter().copied().reduce(f32::min), around.iter().copied().reduce(f32::max));
         let i = index(dims, at);
-        (there[i] + 0.5 * (field[i] - back[i])).clamp(low.unwrap_or(0.0), high.unwrap_or(0.0))
+        let around = corners(dims, field, from[i]);
+        let [low, high] = [f32::min, f32::max].map(|end| around.into_iter().fold(around[0], end));
+        (there[i] + 0.5 * (field[i] - back[i])).clamp(low, high)
     })
 }
 
-/// Where that which is at a voxel is after the time `dt`.
+/// Where the flow carries what is at a voxel within the time `dt`.
 fn place(dims: [usize; 3], velocity: &[Field; 3], at: [usize; 3], dt: f32) -> [f32; 3] {
     std::array::from_fn(|axis| {
         let to = at[axis] as f32 + dt * velocity[axis][index(dims, at)];
@@ -218,6 +225,19 @@ mod tests {
     }
 
     #[test]
+    fn the_source_goes_around_a_circle_without_jumps() {
+        let off = |[a, b]: [[f32; 2]; 2]| ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)).sqrt();
+        for step in 0..256 {
+            let [here, next, opposite] = [0, 1, 64].map(|later| on_circle(step + later));
+            assert!(
+                (off([here, [0.0; 2]]) - 1.0).abs() < 1e-6 && off([here, next]) < 0.07,
+                "{step}: {here:?} {next:?}"
+            );
+            assert_eq!(here, opposite.map(|c| -c), "{step}");
+        }
+    }
+
+    #[test]
     fn projection_takes_divergence_away() {
         let mut flow = Flow::new(DIMS);
         let squared = |at: [usize; 3]| (0..3).map(|a| (at[a] as f32 - DIMS[a] as f32 / 2.0).powi(2)).sum::<f32>();
@@ -236,6 +256,7 @@ mod tests {
     fn a_uniform_wind_carries_smoke_by_whole_voxels() {
         let wind = [1.0, 0.0, 0.0].map(|speed| vec![speed / DT; DIMS.iter().product()]);
         let spot = each(DIMS, |at| if at == [7, 9, 11] { 1.0 } else { 0.0 });
-        assert_eq!(transported(DIMS, &spot, &wind), each(DIMS, |at| if at == [8, 9, 11] { 1.0 } else { 0.0 }));
+        let [from, to] = [-DT, DT].map(|dt| each(DIMS, |at| place(DIMS, &wind, at, dt)));
+        assert_eq!(transported(DIMS, &spot, &from, &to), each(DIMS, |at| if at == [8, 9, 11] { 1.0 } else { 0.0 }));
     }
 }

@@ -1,11 +1,12 @@
 //! Arranges pictures: contact sheets, a colour bar, differences, texts.
 
+use crate::diff::load::{Shape, Stack};
 use crate::diff::measure::of_pixels;
-use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::Write;
 use std::path::Path;
 use wavesplat::base::error::{Error, Result};
-use wavesplat::render::annotate::Letters;
+use wavesplat::render::annotate::{Letters, over};
+use wavesplat_core::base::output::Output;
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
@@ -53,8 +54,7 @@ impl Image {
     fn put(&mut self, x: usize, y: usize, colour: Rgb, share: f64) {
         if x < self.width && y < self.height {
             let pixel = &mut self.pixels[y * self.width + x];
-            let mixed = |c: usize| f64::from(pixel[c]) + share * (f64::from(colour[c]) - f64::from(pixel[c]));
-            *pixel = std::array::from_fn(|c| mixed(c).round() as u8);
+            *pixel = over(*pixel, colour, share);
         }
     }
 
@@ -77,19 +77,28 @@ impl Image {
     }
 
     /// Reads a PNG of 8 bits a channel, without its opacities.
+    ///
+    /// # Errors
+    /// The file cannot be read or is no whole PNG.
     pub fn read_png(path: &Path) -> Result<Self> {
-        let bad = |e: png::DecodingError| Error::io(path, "reading", std::io::Error::other(e));
-        let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
-        let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(bad)?;
-        let mut bytes = vec![0; reader.output_buffer_size().unwrap_or_default()];
-        let info = reader.next_frame(&mut bytes).map_err(bad)?;
-        let channels = info.color_type.samples();
-        let pixels = bytes.chunks_exact(channels).map(|p| std::array::from_fn(|c| p[c.min(channels - 1)])).collect();
-        Ok(Self { width: info.width as usize, height: info.height as usize, pixels })
+        let stack = Stack::open(path)?;
+        let (numbers, Shape { width, height, channels, .. }) = (stack.read(0)?, stack.shape);
+        let pixel = |pixel: &[f64]| std::array::from_fn(|c| pixel[c.min(channels - 1)] as u8);
+        Ok(Self { width, height, pixels: numbers.chunks_exact(channels).map(pixel).collect() })
+    }
+
+    /// Writes the picture to a PNG, which gets its name when it is complete; `force` replaces an existing file.
+    ///
+    /// # Errors
+    /// The file exists, or cannot be written.
+    pub fn save(&self, path: &Path, force: bool) -> Result<()> {
+        let mut out = Output::create(path, force)?;
+        self.write_png(&mut out)?;
+        out.commit()
     }
 
     /// Writes the picture as a PNG.
-    pub fn write_png(&self, to: impl Write) -> Result<()> {
+    fn write_png(&self, to: impl Write) -> Result<()> {
         let side = |n| u32::try_from(n).map_err(|_| Error::usage(format!("{n} pixels are too many for a PNG")));
         let mut encoder = png::Encoder::new(to, side(self.width)?, side(self.height)?);
         encoder.set_color(png::ColorType::Rgb);
@@ -196,10 +205,8 @@ const DIFFERENCES: [Rgb; 5] = [[255; 3], [255, 231, 140], [252, 150, 60], [214, 
 /// White for 0 through yellow and orange to dark red for 1 and more.
 pub fn difference_colour(value: f64) -> Rgb {
     let at = value.clamp(0.0, 1.0) * (DIFFERENCES.len() - 1) as f64;
-    let (below, share) =
-        ((at as usize).min(DIFFERENCES.len() - 2), at - at.floor().min((DIFFERENCES.len() - 2) as f64));
-    let [from, to] = [below, below + 1].map(|n| DIFFERENCES[n].map(f64::from));
-    std::array::from_fn(|c| (from[c] + share * (to[c] - from[c])).round() as u8)
+    let below = (at as usize).min(DIFFERENCES.len() - 2);
+    over(DIFFERENCES[below], DIFFERENCES[below + 1], at - below as f64)
 }
 
 /// The background of pictures of differences.
@@ -267,7 +274,7 @@ mod tests {
     fn a_png_reads_back() {
         let image = Image::from_fn(5, 2, |x, y| [x as u8, y as u8, 3]);
         let file = tempfile::NamedTempFile::new().unwrap();
-        image.write_png(file.as_file()).unwrap();
+        image.save(file.path(), true).unwrap();
         assert_eq!(Image::read_png(file.path()).unwrap(), image);
         std::fs::write(file.path(), b"no picture").unwrap();
         assert!(Image::read_png(file.path()).is_err());

@@ -12,6 +12,8 @@ use wavesplat::source::FrameSource;
 use wavesplat::view::camera::{Camera, View};
 use wavesplat::view::footprint::Kernel;
 
+/// The usual cut of a footprint, in standard deviations.
+pub(crate) const CUT: f64 = 3.0;
 /// Positions within a pixel along each axis.
 const POSITIONS: usize = 32;
 /// A pixel is background where its weights sum to less than this share of the largest.
@@ -27,7 +29,6 @@ pub(crate) fn render<const CHANNELS: usize>(
     sink: &mut dyn FnMut(usize, &[[f32; CHANNELS]]),
 ) -> Result<()> {
     let whole = source.archive().grid.whole();
-    let weights = splatter.splat(&vec![[1.0]; whole.voxels()]);
     let at_once = rayon::current_num_threads();
     for first in (0..frames).step_by(at_once) {
         let window = source.window(first, at_once.min(frames - first))?;
@@ -35,7 +36,7 @@ pub(crate) fn render<const CHANNELS: usize>(
             let mut bytes = vec![0; whole.voxels() * size_of::<f32>()];
             window.read_box(frame, &whole, &mut bytes)?;
             let values: Vec<_> = bytes.as_chunks().0.iter().map(|b| colour(f32::from_le_bytes(*b))).collect();
-            Ok(splatter.mean(&splatter.splat(&values), &weights))
+            Ok(splatter.mean(&splatter.splat(&values)))
         };
         let pictures = (0..window.frames()).into_par_iter().map(picture).collect::<Result<Vec<_>>>()?;
         pictures.iter().zip(first..).for_each(|(picture, frame)| sink(frame, picture));
@@ -51,6 +52,8 @@ pub(crate) struct Splatter {
     table: Table,
     places: Vec<FootprintPosition>,
     size: [usize; 2],
+    /// The sum of the weights at each pixel, in a picture with a margin.
+    weights: Vec<f32>,
 }
 
 /// Where a voxel's footprint goes.
@@ -81,7 +84,10 @@ impl Splatter {
                 attenuation: (kernel.tau * (nearest - z)).exp() as f32,
             }
         };
-        Ok(Self { places: grid.whole().iter().map(place).collect(), table, size })
+        let places = grid.whole().iter().map(place).collect();
+        let mut splatter = Self { places, table, size, weights: Vec::new() };
+        splatter.weights = splatter.splat(&vec![[1.0]; grid.whole().voxels()]).into_flattened();
+        Ok(splatter)
     }
 
     /// The sums of value times weight, in a picture with a margin.
@@ -103,12 +109,12 @@ impl Splatter {
     }
 
     /// The weighted mean without the margin; NaN is background.
-    fn mean<const CHANNELS: usize>(&self, sums: &[[f32; CHANNELS]], weights: &[[f32; 1]]) -> Vec<[f32; CHANNELS]> {
-        let threshold = BACKGROUND * weights.as_flattened().iter().copied().fold(0.0, f32::max);
+    fn mean<const CHANNELS: usize>(&self, sums: &[[f32; CHANNELS]]) -> Vec<[f32; CHANNELS]> {
+        let threshold = BACKGROUND * self.weights.iter().copied().fold(0.0, f32::max);
         let (reach, [width, height]) = (self.table.side / 2, self.size);
         let row = |y: usize| (y + reach) * (width + self.table.side) + reach;
         let mean = |i: usize| {
-            let [weight] = weights[i];
+            let weight = self.weights[i];
             if weight < threshold { [f32::NAN; CHANNELS] } else { sums[i].map(|sum| sum / weight) }
         };
         (0..height).flat_map(|y| (row(y)..row(y) + width).map(mean)).collect()
@@ -165,7 +171,7 @@ mod tests {
             assert!((f64::from(at(x, 4)) - 10.0 * weight(d) * weight(0.0)).abs() < 1e-5, "column {x}: {}", at(x, 4));
         }
         assert_eq!((at(0, 4), at(8, 4)), (0.0, 0.0), "cut");
-        let mean = splatter.mean(&sums, &splatter.splat(&[[1.0]]));
+        let mean = splatter.mean(&sums);
         assert!((mean[4 * 9 + 4][0] - 10.0).abs() < 1e-5 && mean[0][0].is_nan());
     }
 }

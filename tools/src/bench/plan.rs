@@ -1,6 +1,7 @@
 //! Which groups of methods are measured together.
 
 use crate::synth::Kind;
+use crate::textbook;
 use clap::ValueEnum;
 use std::fmt;
 use std::iter::successors;
@@ -46,8 +47,6 @@ pub const BOUNDS: [BoundRow; 4] = [
     BoundRow { name: "sampled", bound: Bound::Sampled { samples: 300, seed: 0 }, worst: |_| None },
 ];
 
-/// The cut of a textbook's footprint, in standard deviations.
-pub const TEXTBOOK_CUT: f64 = 3.0;
 /// Frames that the conventional method with shared footprints splats together.
 const SHARED_GROUP: usize = 32;
 
@@ -115,7 +114,7 @@ impl Sweep {
     fn by_tolerance(&self, kind: Kind) -> impl Iterator<Item = Group> {
         self.tolerances.iter().map(move |tolerance| {
             let coefficients = BOUNDS.iter().flat_map(|bound| BASES.iter().map(|b| Contender::Coefficients(b, bound)));
-            let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(TEXTBOOK_CUT)]).collect();
+            let contenders = coefficients.chain([Contender::Shared, Contender::Textbook(textbook::CUT)]).collect();
             let splat_error = default_splat_error(Some(*tolerance));
             Group { kind, tolerance: *tolerance, splat_error, splat: None, contenders }
         })

@@ -5,7 +5,6 @@ use crate::sheet::{BACKGROUND, Image, Style, difference_colour, difference_image
 use wavesplat::base::error::Result;
 use wavesplat::colour::{Norm, Scale, TransferFunction};
 use wavesplat::source::CHANNELS;
-use wavesplat_core::base::output::Output;
 
 /// The frames that are shown.
 const SHOWN: [usize; 4] = [5, 10, 15, 20];
@@ -15,20 +14,17 @@ const STYLE: Style = Style::LIGHT;
 pub(super) fn draw(demo: &Demo, runs: &[Run], colours: &TransferFunction) -> Result<()> {
     let means = Scale::new(colours, (0.0, 1.0), Norm::Linear, BACKGROUND)?;
     let bound = runs.iter().map(Run::bound).fold(0.0, f64::max);
-    let [pictures, differences] = bars(colours.range(), bound);
+    let [pictures, differences] = bars(colours.range().1, bound);
     let sheets = [
         STYLE.with_bar(&methods(demo, runs, &means), &pictures, |share| means.colour_at(share)),
         STYLE.with_bar(&errors(demo, runs, bound), &differences, difference_colour),
     ];
-    let path = demo.figure();
-    let mut out = Output::create(&path, true)?;
-    STYLE.stacked(&sheets).write_png(&mut out)?;
-    out.commit()
+    STYLE.stacked(&sheets).save(&demo.figure(), true)
 }
 
 /// The labels of the bars of pictures and of differences.
-fn bars((_, hi): (f64, f64), bound: f64) -> [[String; 3]; 2] {
-    let pictures = [format!("{:.0} A/mm²", hi / 1e6), "|J|".into(), "0".into()];
+fn bars(largest: f64, bound: f64) -> [[String; 3]; 2] {
+    let pictures = [format!("{:.0} A/mm²", largest / 1e6), "|J|".into(), "0".into()];
     [pictures, [format!("{bound:.2}, the bound"), "difference".into(), "0".into()]]
 }
 

@@ -9,7 +9,7 @@ mod table;
 
 use crate::diff::measure::Differences;
 use crate::eddy::{Magnet, Plate, eddy_currents};
-use crate::output::{Format, Shape, Target};
+use crate::output::{Format, Target};
 use crate::scenes::{MEMORY, converted, pictures};
 use crate::textbook::{self, Splatter};
 use std::fs;
@@ -18,7 +18,6 @@ use std::time::Instant;
 use wavesplat::base::error::{Error, Result};
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
-use wavesplat::base::sample::SampleType;
 use wavesplat::colour::{ColourSpace, TransferFunction};
 use wavesplat::convert::{Basis, ConvertConfig, ConvertReport};
 use wavesplat::file::CoefficientFile;
@@ -38,8 +37,6 @@ const SPLAT_ERROR: f64 = TOLERANCE / 10.0;
 /// The colours of samples, from small to large. The n-th of N stands at the share (n / N)^2 of the range, because most
 /// currents are far smaller than the largest one.
 const COLOURS: [u32; 7] = [0xffffff, 0xfee0a0, 0xfdae61, 0xf0603f, 0xc1304b, 0x7a1f70, 0x2c115f];
-/// The cut of the textbook's footprints in standard deviations: it leaves out a fortieth of their weight.
-const CUT: f64 = 3.0;
 /// The share of the plate's thickness over which attenuation reaches a factor of e. Currents stay near the face that
 /// the magnet passes; a mean through the whole plate would show only the first colours.
 const ATTENUATION: f64 = 0.1;
@@ -146,13 +143,9 @@ pub fn run(demo: &Demo, say: &mut dyn FnMut(&str)) -> Result<String> {
 /// # Errors
 /// The folder or its files cannot be written.
 pub fn write_frames(folder: &Path, plate: Plate, frames: usize) -> Result<()> {
-    let shape = Shape { dims: plate.dims, frames, ty: SampleType::F32 };
-    let mut solution = eddy_currents(plate, Magnet::default(), frames);
     fs::create_dir_all(folder).map_err(|e| Error::io(folder, "creating", e))?;
-    Target::Directory(folder.into(), Format::Npy).write(&shape, |_, bytes| {
-        let values = solution.next().into_iter().flatten();
-        bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(b, v)| *b = v.to_le_bytes());
-    })
+    let solution = eddy_currents(plate, Magnet::default(), frames);
+    Target::Directory(folder.into(), Format::Npy).write_f32(plate.dims, frames, solution)
 }
 
 impl Demo {
@@ -211,7 +204,8 @@ impl Demo {
         let mut source = self.source()?;
         let grid = source.archive().grid;
         let colour = |sample: f32| colours.colour(sample.into()).unwrap_or_default().map(|c| c as f32);
-        let (mut pictures, splatter) = (Vec::new(), Splatter::new(&grid, &self.view(), self.kernel(&grid)?, CUT)?);
+        let (mut pictures, splatter) =
+            (Vec::new(), Splatter::new(&grid, &self.view(), self.kernel(&grid)?, textbook::CUT)?);
         let clock = Instant::now();
         textbook::render(source.as_mut(), FRAMES, &splatter, colour, &mut |_, picture| {
             pictures.extend_from_slice(picture.as_flattened());

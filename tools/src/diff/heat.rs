@@ -6,7 +6,6 @@ use super::report::number;
 use crate::sheet::{Image, Style, difference_colour, heat};
 use std::path::Path;
 use wavesplat::base::error::Result;
-use wavesplat_core::base::output::Output;
 
 const STYLE: Style = Style::LIGHT;
 /// The largest number of frames shown.
@@ -27,10 +26,8 @@ pub(super) fn draw(a: &Stack, b: &Stack, scale: f64, (path, force): (&Path, bool
     };
     let pictures = frames.iter().map(picture).collect::<Result<Vec<_>>>()?;
     let sheet = STYLE.contact_sheet(&pictures, columns(pictures.len()));
-    let mut out = Output::create(path, force)?;
     let labels = [format!("{} or more", number(scale)), "|A − B|".into(), "0".into()];
-    STYLE.with_bar(&sheet, &labels, difference_colour).write_png(&mut out)?;
-    out.commit()
+    STYLE.with_bar(&sheet, &labels, difference_colour).save(path, force)
 }
 
 /// Frames from the first to the last.

@@ -15,27 +15,27 @@ const EXPECTED: &str = "expected a PNG, or an .npy of (H,W), (F,H,W) or (F,H,W,C
 
 /// The shape of a stack's frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
+pub(crate) struct Shape {
     /// Number of frames.
-    pub(super) frames: usize,
+    pub(crate) frames: usize,
     /// Rows.
-    pub(super) height: usize,
+    pub(crate) height: usize,
     /// Pixels a row.
-    pub(super) width: usize,
+    pub(crate) width: usize,
     /// Numbers a pixel.
-    pub(super) channels: usize,
+    pub(crate) channels: usize,
     /// The type of the numbers.
-    pub(super) sample: SampleType,
+    pub(crate) sample: SampleType,
 }
 
 impl Shape {
     /// Numbers of a frame.
-    pub(super) fn numbers(&self) -> usize {
+    pub(crate) fn numbers(&self) -> usize {
         self.height * self.width * self.channels
     }
 
     /// A description in words.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let Self { frames, height, width, channels, sample } = self;
         format!("{frames} frame(s) of {width}x{height} pixels with {channels} channel(s) of {sample}")
     }
@@ -43,9 +43,9 @@ impl Shape {
 
 /// Pictures of one size and type, read on demand.
 #[derive(Debug)]
-pub(super) struct Stack {
+pub(crate) struct Stack {
     /// What its frames are.
-    pub(super) shape: Shape,
+    pub(crate) shape: Shape,
     frames: Frames,
 }
 
@@ -62,7 +62,7 @@ impl Stack {
     ///
     /// # Errors
     /// Files are absent, damaged or neither of these; arrays have other dimensions; PNGs differ from the first.
-    pub(super) fn open(name: &Path) -> Result<Self> {
+    pub(crate) fn open(name: &Path) -> Result<Self> {
         let paths = formats::files(name, "png")?;
         match &paths[..] {
             [only] if begins(only)?.starts_with(NPY_MAGIC) => Self::open_array(only),
@@ -97,7 +97,7 @@ impl Stack {
     }
 
     /// The files that it is read from.
-    pub(super) fn paths(&self) -> Vec<PathBuf> {
+    pub(crate) fn paths(&self) -> Vec<PathBuf> {
         match &self.frames {
             Frames::Pngs(paths) => paths.clone(),
             Frames::Array { file, .. } => vec![file.path().into()],
@@ -105,7 +105,7 @@ impl Stack {
     }
 
     /// Reads frame `index`: channels one after another at each pixel, row after row.
-    pub(super) fn read(&self, index: usize) -> Result<Vec<f64>> {
+    pub(crate) fn read(&self, index: usize) -> Result<Vec<f64>> {
         let (sample, mut numbers) = (self.shape.sample, vec![0.0; self.shape.numbers()]);
         let bytes = match &self.frames {
             Frames::Pngs(paths) => self.read_png(&paths[index])?,

@@ -1,7 +1,7 @@
 //! `diff`: compares two pictures or two stacks of pictures. Two frames are in memory at a time.
 
 mod heat;
-mod load;
+pub(crate) mod load;
 pub mod measure;
 mod report;
 mod ssim;

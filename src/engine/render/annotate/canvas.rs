@@ -37,7 +37,7 @@ fn contrast([r, g, b]: Rgb) -> Rgb {
 }
 
 /// A colour with a share of another one over it.
-pub(super) fn over(below: Rgb, above: Rgb, share: f64) -> Rgb {
+pub fn over(below: Rgb, above: Rgb, share: f64) -> Rgb {
     std::array::from_fn(|c| (f64::from(below[c]) + share * (f64::from(above[c]) - f64::from(below[c]))).round() as u8)
 }
 

@@ -10,13 +10,14 @@ mod layout;
 mod title;
 mod volume;
 
+pub use canvas::over;
 pub use layout::{Margins, Parts, margins};
 pub use text::Letters;
 pub use ticks::round_values;
 pub use volume::{AxisLabels, VolumeAxes};
 
 use crate::render::ViewReport;
-use canvas::{Canvas, Rectangle, over};
+use canvas::{Canvas, Rectangle};
 use layout::{BAR, has_axes, has_bar, has_time};
 use text::shortened;
 use title::Title;

@@ -2,13 +2,13 @@
 
 use super::peers::Peers;
 use crate::eddy::{Magnet, Plate, eddy_currents};
-use crate::output::{Format, Shape, Target};
+use crate::output::{Format, Target};
 use crate::synth::{Kind, Synth};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
-use wavesplat::base::sample::{self, SampleType};
+use wavesplat::base::sample;
 use wavesplat::formats;
 use wavesplat::source::{OpenOptions, read_frames};
 
@@ -79,12 +79,8 @@ impl Subject {
 fn demo(small: bool, path: &Path) -> Result<()> {
     let coarse = Plate { dims: [38, 38, 11], spacing: 4e-3, ..Plate::default() };
     let (plate, frames) = if small { (coarse, 8) } else { (Plate::default(), crate::demo::FRAMES) };
-    let shape = Shape { dims: plate.dims, frames, ty: SampleType::F32 };
-    let mut solution = eddy_currents(plate, Magnet::default(), frames);
-    Target::File(path.into(), Format::Npy).write(&shape, |_, bytes| {
-        let values = solution.next().into_iter().flatten();
-        bytes.as_chunks_mut().0.iter_mut().zip(values).for_each(|(b, v)| *b = v.to_le_bytes());
-    })
+    let solution = eddy_currents(plate, Magnet::default(), frames);
+    Target::File(path.into(), Format::Npy).write_f32(plate.dims, frames, solution)
 }
 
 /// An archive and its size.
