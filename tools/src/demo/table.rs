@@ -121,6 +121,6 @@ fn size(run: &Run, truth: &Run) -> String {
 const NOTES: &str = "
 A ratio above 1 is faster than the conventional method, which draws frame by frame. A further view needs no transform.
 The inverse also turns sums into pixels; for the lattice's conventional method it does only this. The time for the sums
-of weights, equal for both methods of the lattice, is not counted. Coefficients of three channels are counted together.
+of weights, which a view needs once, is not counted. Coefficients of three channels are counted together.
 One channel gets its colours after projection, so other colours need no new conversion.
 ";
