@@ -72,5 +72,5 @@ fn remote_files_without_their_feature_explain_how_to_get_it() {
     }
     let (folder, advice) = (tempfile::tempdir().unwrap(), "cargo build --release --features remote");
     let words = ["info", "https://example.org/a.wspl"];
-    fails(folder.path(), CONVERTER, &words, 3, &["https://example.org/a.wspl", "not built in", advice]);
+    fails(folder.path(), CONVERTER, &words, 2, &["https://example.org/a.wspl", "not built in", advice]);
 }
