@@ -217,7 +217,7 @@ fn readme_is_short_and_begins_with_the_demo_and_the_tests() {
     let readme = &pages()[0];
     let words = readme.text.split_whitespace().count();
     assert!(words <= MOST_WORDS, "README has {words} words, more than {MOST_WORDS}");
-    let first = ["cargo run --release -p wavesplat-tools -- demo", "cargo test"];
+    let first = ["cargo run --release -p wavesplat-demo", "cargo test"];
     assert_eq!(readme.commands()[..2], first);
 }
 

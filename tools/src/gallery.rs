@@ -1,12 +1,8 @@
 //! The gallery: eight pictures of each archive, as `wavesplat-render` draws them with the options written above; and a banner
 //! of the first archive over time.
 
-use crate::demo::{self, FRAMES};
-use crate::eddy::Plate;
-use crate::output::{Format, Target};
+use crate::diff::load::picture;
 use crate::plume::plume;
-use crate::scenes::{MEMORY, converted};
-use crate::sheet::{Image, Style};
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs;
@@ -16,6 +12,11 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::values::Numbers;
 use wavesplat::convert::{ConvertConfig, MissingPolicy};
 use wavesplat_cli::{InputArgs, render};
+use wavesplat_demo::eddy::Plate;
+use wavesplat_demo::experiment::{FRAMES, write_frames};
+use wavesplat_demo::output::{Format, Target};
+use wavesplat_demo::scenes::{MEMORY, converted};
+use wavesplat_demo::sheet::{Image, Style};
 use wavesplat_jobs::picture::{Caller, run};
 
 /// The default archives.
@@ -134,7 +135,7 @@ impl Gallery {
             "demo" => {
                 say("solving for eddy currents in a plate under a passing magnet");
                 let plate = Plate::default();
-                demo::write_frames(&frames, plate, FRAMES)?;
+                write_frames(&frames, plate, FRAMES)?;
                 (frames, InputArgs { spacing: Some(Numbers([plate.spacing; 3])), ..own })
             }
             given => (given.into(), self.input.clone()),
@@ -182,7 +183,7 @@ impl Gallery {
         words.extend(options.split(' ').map(Into::into));
         let parsed = render::parsed(words)?;
         run(&parsed.session, &parsed.request, &Caller(&Silent))?;
-        let picture = Image::read_png(&path)?;
+        let picture = picture(&path)?;
         fs::remove_file(&path).map_err(|e| Error::io(&path, "removing", e))?;
         Ok(picture)
     }
@@ -198,10 +199,10 @@ fn name(archive: &str) -> String {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::output::Shape;
-    use crate::sheet::Rgb;
     use crate::synth::{Kind, Synth};
     use wavesplat::base::sample::SampleType;
+    use wavesplat_demo::output::Shape;
+    use wavesplat_demo::sheet::Rgb;
 
     fn gallery(folder: &Path, archives: Vec<String>) -> Gallery {
         Gallery { archives, input: plain(), folder: folder.into(), side: 40 }
@@ -234,9 +235,9 @@ mod tests {
             said,
             ["converting above", "drawing the banner", "drawing above", "converting signed", "drawing signed"]
         );
-        let (sheet, gap) = (Image::read_png(&gallery.sheet()).unwrap(), GALLERY.gap());
+        let (sheet, gap) = (picture(&gallery.sheet()).unwrap(), GALLERY.gap());
         assert!(sheet.width == gap + 4 * (40 + gap) && sheet.height > 4 * 40, "{} {}", sheet.width, sheet.height);
-        let banner = Image::read_png(&gallery.banner()).unwrap();
+        let banner = picture(&gallery.banner()).unwrap();
         let width = 40 + BANNER.gap();
         let shows = |n: usize| {
             let row = |row: &[Rgb]| row[BANNER.gap() + n * width..][..40].iter().any(|pixel| *pixel != BANNER.paper);

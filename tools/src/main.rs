@@ -8,13 +8,13 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::sample::SampleType;
 use wavesplat_cli::InputArgs;
 use wavesplat_cli::error_text;
+use wavesplat_demo::eddy::Plate;
+use wavesplat_demo::experiment::{self, Demo as Experiment};
+use wavesplat_demo::output::{Format, Shape, Target};
 use wavesplat_tools::bench::size::{self, Peers, Subject};
 use wavesplat_tools::bench::{self, plan::Sweep, sanity, speed};
-use wavesplat_tools::demo;
 use wavesplat_tools::diff;
-use wavesplat_tools::eddy::Plate;
 use wavesplat_tools::gallery::{self, Gallery};
-use wavesplat_tools::output::{Format, Shape, Target};
 use wavesplat_tools::synth::{Kind, Synth};
 
 const EXAMPLES: &str = "\
@@ -72,7 +72,7 @@ struct Demo {
     #[arg(long)]
     frames_only: bool,
     /// The folder to write to
-    #[arg(short, long, value_name = "DIR", default_value = "demo-output")]
+    #[arg(short, long, value_name = "DIR", default_value = experiment::FOLDER)]
     output: PathBuf,
 }
 
@@ -310,12 +310,10 @@ fn say(text: &str) {
 
 fn demo(args: &Demo) -> Result<()> {
     if args.frames_only {
-        return demo::write_frames(&args.output, Plate::default(), demo::FRAMES);
+        return experiment::write_frames(&args.output, Plate::default(), experiment::FRAMES);
     }
-    let all = demo::Demo::new(args.output.clone());
-    let table = demo::run(&all, &mut |step| say(&format!("{step} ...")))?;
-    let figure = all.figure();
-    wavesplat_cli::print(&format!("\n{table}\nFigure 5 is {}.\n", figure.display()))
+    let all = Experiment::new(args.output.clone());
+    wavesplat_cli::print(&experiment::run(&all, &mut |step| say(&format!("{step} ...")))?)
 }
 
 fn gallery(args: &GalleryArgs) -> Result<()> {

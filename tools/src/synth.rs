@@ -4,7 +4,6 @@
 //! that a voxel costs a few multiplications. A frame depends only on the settings and its number. Coordinates and time
 //! run over 0..1, so that more voxels or frames refine the same scene.
 
-use crate::output::{Format, Shape, Target};
 use crate::random::Random;
 use clap::ValueEnum;
 use std::f64::consts::{PI, TAU};
@@ -12,6 +11,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::Result;
 use wavesplat::base::sample::{self, SampleType};
+use wavesplat_demo::output::{Format, Shape, Target};
 
 /// What the frames show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ValueEnum)]

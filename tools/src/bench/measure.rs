@@ -8,8 +8,6 @@ use super::process::{Outcome, in_process};
 use super::reference::ReferencePixels;
 use super::settings::Config;
 use super::stages::{Convert, Converted, Render, RenderMethod, Rendered, open_frames};
-use crate::output::{Format, Shape, Target};
-use crate::scenes::MEMORY;
 use crate::synth::{Kind, Synth};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,6 +16,8 @@ use wavesplat::base::progress::Silent;
 use wavesplat::base::sample::{self, SampleType};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::{Comparison, verify};
+use wavesplat_demo::output::{Format, Shape, Target};
+use wavesplat_demo::scenes::MEMORY;
 
 /// What all groups share.
 pub(super) struct Bench<'a> {

@@ -1,7 +1,6 @@
 //! Which groups of methods are measured together.
 
 use crate::synth::Kind;
-use crate::textbook;
 use clap::ValueEnum;
 use std::fmt;
 use std::iter::successors;
@@ -9,6 +8,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::convert::{Basis, Bound};
 use wavesplat::render::{Quantity, default_splat_error, splat_method};
 use wavesplat::view::footprint::Method;
+use wavesplat_demo::textbook;
 
 /// A basis, and the window it is measured with.
 #[derive(Debug, PartialEq)]

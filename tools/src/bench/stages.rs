@@ -5,8 +5,6 @@ use super::json::bad_json;
 use super::plan::{BASES, BOUNDS};
 use super::process::ProcessTask;
 use super::reference::{ImageError, ReferencePixels};
-use crate::scenes::MEMORY;
-use crate::textbook::{self, Splatter};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::BufReader;
@@ -21,6 +19,8 @@ use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, Scene, Splat
 use wavesplat::source::{FrameSource, OpenOptions, Selection, select};
 use wavesplat::view::footprint::Kernel;
 use wavesplat_core::base::output::Output;
+use wavesplat_demo::scenes::MEMORY;
+use wavesplat_demo::textbook::{self, Splatter};
 
 /// Converts frames to a coefficient file.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -1,11 +1,11 @@
 //! The heat map: where two stacks differ, and by how much.
 
 use super::load::Stack;
-use super::measure::{largest, of_pixels};
 use super::report::number;
-use crate::sheet::{Image, Style, difference_colour, heat};
 use std::path::Path;
 use wavesplat::base::error::Result;
+use wavesplat_demo::differences::{largest, of_pixels};
+use wavesplat_demo::sheet::{Image, Style, difference_colour, heat};
 
 const STYLE: Style = Style::LIGHT;
 /// The largest number of frames shown.

@@ -7,6 +7,7 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::mapped::{Access, FileBytes};
 use wavesplat::base::sample::{self, SampleType};
 use wavesplat::formats;
+use wavesplat_demo::sheet::Image;
 
 const PNG_MAGIC: &[u8] = b"\x89PNG";
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
@@ -137,6 +138,14 @@ impl Stack {
     }
 }
 
+/// The colours of a PNG of 8 bits a channel, without its opacities.
+pub(crate) fn picture(path: &Path) -> Result<Image> {
+    let stack = Stack::open(path)?;
+    let (numbers, Shape { width, height, channels, .. }) = (stack.read(0)?, stack.shape);
+    let pixel = |pixel: &[f64]| std::array::from_fn(|c| pixel[c.min(channels - 1)] as u8);
+    Ok(Image { width, height, pixels: numbers.chunks_exact(channels).map(pixel).collect() })
+}
+
 /// A file's first bytes.
 fn begins(path: &Path) -> Result<Vec<u8>> {
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
@@ -190,5 +199,21 @@ fn damaged(path: &Path, error: png::DecodingError) -> Error {
         png::DecodingError::IoError(e) if e.kind() != io::ErrorKind::UnexpectedEof => Error::io(path, "reading", e),
         png::DecodingError::IoError(_) => Error::input(path, "ends inside the PNG; expected a whole one"),
         other => Error::input(path, format!("is damaged; expected a whole PNG: {other}")),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_png_reads_back() {
+        let image = Image::from_fn(5, 2, |x, y| [x as u8, y as u8, 3]);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        image.save(file.path(), true).unwrap();
+        assert_eq!(picture(file.path()).unwrap(), image);
+        std::fs::write(file.path(), b"no picture").unwrap();
+        assert!(picture(file.path()).is_err());
     }
 }

@@ -2,14 +2,12 @@
 
 mod heat;
 pub(crate) mod load;
-pub mod measure;
 mod report;
 mod ssim;
 
 pub use report::{HeatMap, PixelPosition, Report, Statistics, WorstFrame};
 
 use load::{Shape, Stack};
-use measure::Differences;
 use ssim::{Picture, Scope, ssim};
 use std::path::{Path, PathBuf};
 use wavesplat::base::error::{Error, Result};
@@ -17,6 +15,7 @@ use wavesplat::base::inputs::spare_inputs;
 use wavesplat::base::sample::SampleType;
 use wavesplat_cli as cli;
 use wavesplat_core::base::output::Output;
+use wavesplat_demo::differences::Differences;
 
 // Each paragraph is one line, which is broken to fit the terminal.
 const HELP: &str = "\

@@ -1,11 +1,11 @@
 //! The report about two stacks.
 
 use super::load::Shape;
-use super::measure::Differences;
 use super::ssim::WINDOW;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use wavesplat_demo::differences::Differences;
 
 /// The whole report, as printed by `--json`. `schema` changes if the meaning of a key changes.
 #[derive(Debug, Clone, Serialize)]

@@ -1,8 +1,6 @@
 //! The measured archives: those of the user, and those made here or by the peers' script.
 
 use super::peers::Peers;
-use crate::eddy::{Magnet, Plate, eddy_currents};
-use crate::output::{Format, Target};
 use crate::synth::{Kind, Synth};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
@@ -11,6 +9,8 @@ use wavesplat::base::error::{Error, Result};
 use wavesplat::base::sample;
 use wavesplat::formats;
 use wavesplat::source::{OpenOptions, read_frames};
+use wavesplat_demo::eddy::{Magnet, Plate, eddy_currents};
+use wavesplat_demo::output::{Format, Target};
 
 /// An archive that can be made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -78,7 +78,7 @@ impl Subject {
 /// |J| in A/m^2.
 fn demo(small: bool, path: &Path) -> Result<()> {
     let coarse = Plate { dims: [38, 38, 11], spacing: 4e-3, ..Plate::default() };
-    let (plate, frames) = if small { (coarse, 8) } else { (Plate::default(), crate::demo::FRAMES) };
+    let (plate, frames) = if small { (coarse, 8) } else { (Plate::default(), wavesplat_demo::experiment::FRAMES) };
     let solution = eddy_currents(plate, Magnet::default(), frames);
     Target::File(path.into(), Format::Npy).write_f32(plate.dims, frames, solution)
 }

@@ -3,7 +3,6 @@
 use super::clock::{least, stay_on_one_core};
 use super::schemes;
 use crate::bench::process::ProcessTask;
-use crate::scenes::MEMORY;
 use memmap2::MmapMut;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -20,6 +19,7 @@ use wavesplat::source::{OpenOptions, read_frames};
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::bound::difference_up;
 use wavesplat_core::codec::decode::Block;
+use wavesplat_demo::scenes::MEMORY;
 
 /// The settings of a measurement.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -6,14 +6,14 @@
 //! is f32. Frames are rendered in parallel, each by one thread.
 
 use rayon::prelude::*;
-use wavesplat::base::error::Result;
-use wavesplat::base::grid::Grid;
-use wavesplat::source::FrameSource;
-use wavesplat::view::camera::{Camera, View};
-use wavesplat::view::footprint::Kernel;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Grid;
+use wavesplat_core::source::FrameSource;
+use wavesplat_core::view::camera::{Camera, View};
+use wavesplat_core::view::footprint::Kernel;
 
 /// The usual cut of a footprint, in standard deviations.
-pub(crate) const CUT: f64 = 3.0;
+pub const CUT: f64 = 3.0;
 /// Positions within a pixel along each axis.
 const POSITIONS: usize = 32;
 /// A pixel is background where its weights sum to less than this share of the largest.
@@ -21,7 +21,7 @@ const BACKGROUND: f32 = 0.01;
 
 /// Renders the first `frames` frames of a source of f32 samples, giving each to `sink`: a number for each pixel and
 /// channel that `colour` makes of a sample.
-pub(crate) fn render<const CHANNELS: usize>(
+pub fn render<const CHANNELS: usize>(
     source: &mut dyn FrameSource,
     frames: usize,
     splatter: &Splatter,
@@ -48,7 +48,7 @@ pub(crate) fn render<const CHANNELS: usize>(
 const OUTSIDE: u32 = u32::MAX;
 
 /// All that is the same for every frame of a view.
-pub(crate) struct Splatter {
+pub struct Splatter {
     table: Table,
     places: Vec<FootprintPosition>,
     size: [usize; 2],
@@ -68,7 +68,7 @@ struct FootprintPosition {
 
 impl Splatter {
     /// Of kernels that are cut at `radius` standard deviations.
-    pub(crate) fn new(grid: &Grid, view: &View, kernel: Kernel, radius: f64) -> Result<Self> {
+    pub fn new(grid: &Grid, view: &View, kernel: Kernel, radius: f64) -> Result<Self> {
         let camera = Camera::new(view, grid)?;
         let (table, size) = (Table::new(kernel.sigma * camera.scale, radius), view.size);
         let (width, nearest) = (size[0] + table.side, camera.nearest_of(grid));

@@ -2,9 +2,9 @@
 
 use super::{Demo, Run};
 use crate::sheet::{BACKGROUND, Image, Style, difference_colour, difference_images};
-use wavesplat::base::error::Result;
-use wavesplat::colour::{Norm, Scale, TransferFunction};
-use wavesplat::source::CHANNELS;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::colour::{Norm, Scale, TransferFunction};
+use wavesplat_core::source::CHANNELS;
 
 /// The frames that are shown.
 const SHOWN: [usize; 4] = [5, 10, 15, 20];

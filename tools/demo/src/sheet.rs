@@ -1,12 +1,11 @@
 //! Arranges pictures: contact sheets, a colour bar, differences, texts.
 
-use crate::diff::load::{Shape, Stack};
-use crate::diff::measure::of_pixels;
+use crate::differences::of_pixels;
 use std::io::Write;
 use std::path::Path;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::render::annotate::{Letters, over};
+use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::Output;
+use wavesplat_engine::render::annotate::{Letters, over};
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
@@ -74,17 +73,6 @@ impl Image {
                 self.put(x, y, style.ink, share);
             }
         });
-    }
-
-    /// Reads a PNG of 8 bits a channel, without its opacities.
-    ///
-    /// # Errors
-    /// The file cannot be read or is no whole PNG.
-    pub fn read_png(path: &Path) -> Result<Self> {
-        let stack = Stack::open(path)?;
-        let (numbers, Shape { width, height, channels, .. }) = (stack.read(0)?, stack.shape);
-        let pixel = |pixel: &[f64]| std::array::from_fn(|c| pixel[c.min(channels - 1)] as u8);
-        Ok(Self { width, height, pixels: numbers.chunks_exact(channels).map(pixel).collect() })
     }
 
     /// Writes the picture to a PNG, which gets its name when it is complete; `force` replaces an existing file.
@@ -268,16 +256,6 @@ mod tests {
         assert_eq!((pixel(&sheet, 1, 1), pixel(&sheet, 4, 3)), (RED, RED));
         assert_eq!((pixel(&sheet, 6, 1), pixel(&sheet, 1, 5)), (BLUE, [9; 3]));
         assert_eq!(pixel(&sheet, 6, 5), [7; 3]); // the free place
-    }
-
-    #[test]
-    fn a_png_reads_back() {
-        let image = Image::from_fn(5, 2, |x, y| [x as u8, y as u8, 3]);
-        let file = tempfile::NamedTempFile::new().unwrap();
-        image.save(file.path(), true).unwrap();
-        assert_eq!(Image::read_png(file.path()).unwrap(), image);
-        std::fs::write(file.path(), b"no picture").unwrap();
-        assert!(Image::read_png(file.path()).is_err());
     }
 
     #[test]

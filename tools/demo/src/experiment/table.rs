@@ -1,4 +1,4 @@
-//! Table 1 compared with that of [Dobashi](wavesplat::bibliography), with file sizes and errors, which the paper does not give.
+//! Table 1 compared with that of [Dobashi](wavesplat_core::bibliography), with file sizes and errors, which the paper does not give.
 
 use super::{Demo, Experiment, FRAMES, Run, TOLERANCE};
 use std::fmt::Write as _;

@@ -3,8 +3,9 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::sample::SampleType;
+use std::str::FromStr;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::sample::SampleType;
 
 /// The size and the type of an archive's frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,12 +26,21 @@ impl Shape {
 }
 
 /// How samples are stored. Both are little-endian with x fastest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// NumPy's, with a header
+    /// NumPy's, with a header.
     Npy,
-    /// Samples alone
+    /// Samples alone.
     Raw,
+}
+
+impl FromStr for Format {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let known = [Self::Npy, Self::Raw].into_iter().find(|format| format.extension() == text);
+        known.ok_or_else(|| "expected npy or raw".into())
+    }
 }
 
 impl Format {
@@ -138,7 +148,7 @@ fn write_frame(path: &Path, format: Format, shape: &Shape, bytes: &[u8]) -> io::
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use wavesplat::formats::array_header;
+    use wavesplat_formats::array_header;
 
     const SHAPE: Shape = Shape { dims: [4, 3, 2], frames: 5, ty: SampleType::U16 };
 

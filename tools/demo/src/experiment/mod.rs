@@ -1,4 +1,4 @@
-//! The demo: the experiment of [Dobashi](wavesplat::bibliography), sections 4.1 and 4.2, in small, from a solver's frames to
+//! The demo: the experiment of [Dobashi](wavesplat_core::bibliography), sections 4.1 and 4.2, in small, from a solver's frames to
 //! figure 5 and table 1.
 //!
 //! As in the paper, every sample is first turned into red, green and blue, and all methods splat three channels. The
@@ -7,7 +7,7 @@
 mod figure;
 mod table;
 
-use crate::diff::measure::Differences;
+use crate::differences::Differences;
 use crate::eddy::{Magnet, Plate, eddy_currents};
 use crate::output::{Format, Target};
 use crate::scenes::{MEMORY, converted, pictures};
@@ -15,19 +15,20 @@ use crate::textbook::{self, Splatter};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use wavesplat::base::error::{Error, Result};
-use wavesplat::base::grid::Grid;
-use wavesplat::base::progress::Silent;
-use wavesplat::colour::{ColourSpace, TransferFunction};
-use wavesplat::convert::{Basis, ConvertConfig, ConvertReport};
-use wavesplat::file::CoefficientFile;
-use wavesplat::file::verify::{Comparison, verify};
-use wavesplat::formats;
-use wavesplat::render::{CoefficientScene, FrameScene, RenderConfig, RenderReport, Scene, SplatSource};
-use wavesplat::source::{self, FrameSource, OpenOptions};
-use wavesplat::view::camera::View;
-use wavesplat::view::footprint::Kernel;
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::Grid;
+use wavesplat_core::base::progress::Silent;
+use wavesplat_core::colour::{ColourSpace, TransferFunction};
+use wavesplat_core::source::{self, FrameSource, OpenOptions};
+use wavesplat_core::view::camera::View;
+use wavesplat_core::view::footprint::Kernel;
+use wavesplat_engine::convert::{Basis, ConvertConfig, ConvertReport};
+use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::verify::{Comparison, verify};
+use wavesplat_engine::render::{CoefficientScene, FrameScene, RenderConfig, RenderReport, Scene, SplatSource};
 
+/// The folder of its files.
+pub const FOLDER: &str = "demo-output";
 /// Frames of the experiment.
 pub const FRAMES: usize = 32;
 /// The tolerance of the paper, about 5/256.
@@ -130,12 +131,13 @@ struct Experiment {
     textbook: Run,
 }
 
-/// Solves, converts, renders and compares. Draws figure 5 and returns table 1 as text. Reports progress through `say`.
+/// Solves, converts, renders and compares. Draws figure 5 and returns table 1, and where the figure is, as text. Reports progress through `say`.
 ///
 /// # Errors
 /// Files cannot be written or read again.
 pub fn run(demo: &Demo, say: &mut dyn FnMut(&str)) -> Result<String> {
-    Ok(table::text(demo, &demo.experiment(say)?))
+    let table = table::text(demo, &demo.experiment(say)?);
+    Ok(format!("\n{table}\nFigure 5 is {}.\n", demo.figure().display()))
 }
 
 /// Writes the solver's frames of |J| (A/m^2) as `frame_0000.npy` and so on.
@@ -151,7 +153,7 @@ pub fn write_frames(folder: &Path, plate: Plate, frames: usize) -> Result<()> {
 impl Demo {
     fn source(&self) -> Result<Box<dyn FrameSource>> {
         let spacing = Some([self.plate.spacing; 3]);
-        formats::open(&[self.frames()], &OpenOptions { spacing, ..OpenOptions::default() })
+        wavesplat_formats::open(&[self.frames()], &OpenOptions { spacing, ..OpenOptions::default() })
     }
 
     /// All methods with three channels, which figure 5 shows, and with one.
