@@ -1,10 +1,11 @@
 //! Expands the inputs of the user to a list of files in the order of time.
 
-use super::{by_name, has_header};
+use super::{by_name, has_header, links};
 use crate::format::{Format, Reader};
 use crate::shared::extension::extension;
 use crate::zarr::metadata_file;
-use crate::{file_series, numbering, vtk, vtk_xml};
+use crate::numbering::{self, Planes};
+use crate::{file_series, vtk, vtk_xml};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,27 +15,57 @@ use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::OpenOptions;
 use wavesplat_core::source::series::FrameFiles;
 
+/// The files of the inputs.
+pub(crate) struct Expanded {
+    pub(crate) files: FrameFiles,
+    /// Whether each holds a plane of a frame.
+    pub(crate) planes: Option<Planes>,
+}
+
 /// The files that the inputs stand for.
-pub(crate) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<FrameFiles> {
+pub(crate) fn expand(inputs: &[PathBuf], options: &OpenOptions) -> Result<Expanded> {
     refuse_frames(inputs)?;
-    let files = match inputs {
+    let mut files = match inputs {
         [only] => expand_one(only, options)?,
         _ => FrameFiles { paths: listed(inputs)?, ..FrameFiles::default() },
     };
     refuse_twice(&files.paths)?;
-    if files.times.is_empty() && !options.allow_gaps {
-        if inputs.len() == 1 {
-            numbering::check_one_series(&files.paths)?;
-        }
+    refuse_lost(&files.paths)?;
+    let (is_sorted, is_checked) = (inputs.len() == 1 && files.times.is_empty(), !options.allow_gaps);
+    if is_sorted && is_checked {
+        numbering::check_one_series(&files.paths)?;
+    }
+    let planes = if is_sorted { numbering::sort(&mut files.paths)? } else { None };
+    if files.times.is_empty() && is_checked && planes.is_none() {
         numbering::check(&files.paths)?;
     }
-    Ok(files)
+    Ok(Expanded { files, planes })
+}
+
+/// An error if a file is a link to one that is not there.
+fn refuse_lost(paths: &[PathBuf]) -> Result<()> {
+    match paths.iter().find(|path| is_lost(path)) {
+        Some(path) => Err(lost(path)),
+        None => Ok(()),
+    }
+}
+
+/// Whether a path is a link that leads nowhere.
+pub(crate) fn is_lost(path: &Path) -> bool {
+    path.is_symlink() && fs::metadata(path).is_err()
+}
+
+/// The error of such a link.
+pub(crate) fn lost(link: &Path) -> Error {
+    let to = fs::read_link(link).unwrap_or_default();
+    let gone = |e| Error::input(link, format!("is a link to {}, which cannot be opened: {e}", to.display()));
+    fs::metadata(link).map_or_else(gone, |_| Error::input(link, "is a link that leads nowhere"))
 }
 
 /// Whether the inputs are files with headers.
 pub(crate) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
     let files = expand(inputs, &options.for_headers());
-    files.is_ok_and(|files| has_header(&files.paths[0]))
+    files.is_ok_and(|all| has_header(&all.files.paths[0]))
 }
 
 /// The files that one name stands for, sorted naturally: those of a folder whose names end in `extension` (lower case,
@@ -51,6 +82,7 @@ pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
     if files.is_empty() {
         return Err(Error::path(input, format!("has no .{extension} file")));
     }
+    numbering::sort(&mut files)?;
     Ok(files)
 }
 
@@ -110,13 +142,21 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
             let place = e.path().to_path_buf();
             Error::io(place, "listing", e.into())
         })?;
-        paths.extend(path.is_file().then_some(path));
+        paths.extend(may_be_file(&path).then_some(path));
+    }
+    if let Some(link) = links::lost_to(pattern, rules) {
+        return Err(lost(&link));
     }
     if paths.is_empty() {
         return Err(refused("no file matches this pattern".into()));
     }
-    alphanumeric_sort::sort_path_slice(&mut paths);
+    numbering::sort(&mut paths)?;
     Ok(paths)
+}
+
+/// Whether a path is a file, or a link of which nothing is known.
+fn may_be_file(path: &Path) -> bool {
+    path.is_file() || is_lost(path)
 }
 
 fn directory(folder: &Path, options: &OpenOptions) -> Result<FrameFiles> {
@@ -156,7 +196,7 @@ fn visible_files(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         let hidden = name(&path).starts_with('.');
-        files.extend((!hidden && path.is_file()).then_some(path));
+        files.extend((!hidden && may_be_file(&path)).then_some(path));
     }
     alphanumeric_sort::sort_path_slice(&mut files);
     Ok(files)
@@ -225,7 +265,7 @@ mod tests {
         let mut files = frames(&folder, 0..3);
         files.reverse();
         let listed = expand(&files, &raw()).expect("list");
-        assert_eq!(listed.paths, files);
+        assert_eq!(listed.files.paths, files);
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! Opens inputs: finds the files, recognises each format by its extension or first bytes, and reads the headers.
 
 pub(crate) mod inputs;
+mod links;
 mod magnitude;
+mod planes;
 #[cfg(test)]
 mod series_tests;
 mod stream;
@@ -60,8 +62,12 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
 }
 
 fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    let files = inputs::expand(inputs, options)?;
-    Ok(Box::new(Series::open(&files, options, |path, extent| describe(path, options, extent))?))
+    let inputs::Expanded { files, planes } = inputs::expand(inputs, options)?;
+    let open = |options: &OpenOptions| Series::open(&files, options, |path, extent| describe(path, options, extent));
+    match planes {
+        Some(planes) => planes::stacked(&files.paths[0], options, planes, open),
+        None => Ok(Box::new(open(options)?)),
+    }
 }
 
 /// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A
@@ -77,7 +83,7 @@ pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variab
     {
         return Ok(Vec::new());
     }
-    choices(&inputs::expand(inputs, options)?.paths[0], options)
+    choices(&inputs::expand(inputs, options)?.files.paths[0], options)
 }
 
 /// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`, or one for each

@@ -1,37 +1,56 @@
-//! Finds missing frames by the numbers in file names.
+//! The order of frames by the numbers in file names, and frames that are missing by these.
+//!
+//! [`names`] reads the numbers, [`order`] decides which of them counts frames.
 
+mod dates;
+mod names;
+mod order;
+
+pub(crate) use order::{Planes, sort};
+
+use names::{Column, Name, Reading, Style};
+use order::{Found, found};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 
-const MAX_DIGITS: usize = 18; // longer numbers are left alone
-const MARK: char = '\0'; // in no path
-
-/// An error if at least three names differ in one number alone and its steps are not all the same.
+/// An error if at least three names differ in one number alone and its steps are not all the same, or if names count two
+/// things.
 pub(crate) fn check(paths: &[PathBuf]) -> Result<()> {
-    let Some(numbers) = the_number(paths) else { return Ok(()) };
-    let steps: Vec<i64> = numbers.windows(2).map(|n| n[1] - n[0]).collect();
+    if paths.len() < 3 {
+        return Ok(());
+    }
+    let (numbers, is_one) = match found(paths) {
+        Found::One { numbers, is_alone } => (numbers, is_alone),
+        Found::Several(several) => return Err(several.refused(paths, Some(Remedy::AllowGaps))),
+        Found::Nothing | Found::Unclear { .. } => return Ok(()),
+    };
+    let steps: Vec<i128> = numbers.values.windows(2).map(|n| n[1] - n[0]).collect();
+    if is_a_shells_order(paths, &numbers) {
+        return Err(out_of_order(&paths[0]));
+    }
     let usual = usual_step(&steps);
-    match steps.iter().position(|s| *s != usual) {
-        Some(_) if is_a_shells_order(&numbers) => Err(out_of_order(&paths[0])),
-        Some(at) => Err(irregular(&paths[at], &paths[at + 1], steps[at], usual)),
+    match steps.iter().position(|s| is_one && !numbers.is_near(*s, usual)) {
+        Some(at) => Err(irregular(&paths[at], &paths[at + 1], &Steps { step: steps[at], usual, unit: numbers.unit })),
         None => Ok(()),
     }
 }
 
 /// As [`check`], for the steps of a variable of a file; `what` names them in messages.
-pub(crate) fn check_steps(file: &Path, variable: &str, what: &str, steps: &[u64]) -> Result<()> {
+pub(crate) fn check_steps<T: std::fmt::Display>(file: &Path, variable: &str, what: &str, steps: &[T]) -> Result<()> {
     let names: Vec<PathBuf> = steps.iter().map(|step| format!("{what} {step}").into()).collect();
     let refused = |e: Error| Error::input(file, Note { text: format!("{variable}: {e}"), remedy: e.remedy() });
     check(&names).map_err(refused)
 }
 
-/// Whether numbers are regular, but in the order of their digits: as a shell puts the names that match a pattern.
-fn is_a_shells_order(numbers: &[i64]) -> bool {
-    let (mut sorted, mut by_digits) = (numbers.to_vec(), numbers.to_vec());
-    sorted.sort_unstable();
-    by_digits.sort_by_key(i64::to_string);
-    by_digits == numbers && sorted != numbers && sorted.windows(3).all(|n| n[1] - n[0] == n[2] - n[1])
+/// Whether numbers would be regular, but names are in the order of their letters: as a shell puts the names that match a
+/// pattern.
+fn is_a_shells_order(paths: &[PathBuf], numbers: &Column) -> bool {
+    let order = numbers.order();
+    let is_sorted = order.windows(2).all(|pair| pair[0] < pair[1]);
+    let by_digits = || numbers.values.iter().map(ToString::to_string).is_sorted();
+    let by_letters = || paths.is_sorted_by_key(|path| path.as_os_str());
+    !is_sorted && numbers.is_regular() && numbers.is_unique() && (by_digits() || by_letters())
 }
 
 fn out_of_order(first: &Path) -> Error {
@@ -41,73 +60,58 @@ fn out_of_order(first: &Path) -> Error {
 
 /// An error if numbered names differ in more than their numbers: a folder with frames of two variables, say.
 pub(crate) fn check_one_series(paths: &[PathBuf]) -> Result<()> {
-    let words = |p: &PathBuf| pieces(p).map(|(words, _)| words).filter(|w| w.contains(MARK));
+    if [Style::Decimals, Style::Signed, Style::Integers].into_iter().any(|style| Reading::of(paths, style).is_some()) {
+        return Ok(());
+    }
+    let words = |p: &PathBuf| Name::parse(p, Style::Decimals).filter(Name::is_numbered).map(|name| name.words);
     let Some((first, other)) = paths.first().zip(paths.iter().find(|p| words(p) != words(&paths[0]))) else {
         return Ok(());
     };
     if paths.iter().all(|p| words(p).is_none()) {
         return Ok(());
     }
-    let names = [first, other].map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned());
-    let what = format!("{} and {} look like two series", names[0], names[1]);
+    let what = format!("{} and {} look like two series", name(first), name(other));
     let text = format!("{what}; a pattern in quotes chooses one");
     Err(Error::input(other, Note::with(text, Remedy::AllowGaps)))
 }
 
-fn irregular(before: &Path, after: &Path, step: i64, usual: i64) -> Error {
-    let name = |p: &Path| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
+/// The name of a file without its folder.
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A step, and the usual one, in units of a power of 10.
+struct Steps {
+    step: i128,
+    usual: i128,
+    unit: i32,
+}
+
+fn irregular(before: &Path, after: &Path, steps: &Steps) -> Error {
     let (a, b) = if before.parent() == after.parent() {
         (name(before), name(after))
     } else {
         (before.display().to_string(), after.display().to_string())
     };
+    let Steps { step, usual, unit } = *steps;
     let why = if step.signum() == usual.signum() && step.abs() > usual.abs() {
         "a frame seems to be missing".into()
+    } else if unit >= 0 {
+        format!("the numbers usually go in steps of {usual}{}", "0".repeat(unit as usize))
     } else {
-        format!("the numbers usually go in steps of {usual}")
+        format!("the numbers usually go in steps of {}", usual as f64 / 10_f64.powi(-unit))
     };
     Error::input(after, Note::with(format!("{a} is followed by {b}: {why}"), Remedy::AllowGaps))
 }
 
 /// The most frequent step, the smallest of several.
-fn usual_step(steps: &[i64]) -> i64 {
+fn usual_step(steps: &[i128]) -> i128 {
     let mut counts = HashMap::new();
     for step in steps {
         *counts.entry(*step).or_insert(0_usize) += 1;
     }
     let best = counts.into_iter().max_by_key(|(step, count)| (*count, std::cmp::Reverse(step.unsigned_abs()), *step));
     best.map_or(0, |(step, _)| step)
-}
-
-/// The one number in which the names differ, for each of them.
-fn the_number(paths: &[PathBuf]) -> Option<Vec<i64>> {
-    let (first, rest) = paths.split_first().filter(|_| paths.len() >= 3)?;
-    let first = pieces(first)?;
-    let mut rows = vec![first.1];
-    for path in rest {
-        let (words, numbers) = pieces(path)?;
-        rows.push(numbers);
-        if words != first.0 {
-            return None;
-        }
-    }
-    let mut columns = (0..rows[0].len()).filter(|c| rows.iter().any(|r| r[*c] != rows[0][*c]));
-    let (only, None) = (columns.next()?, columns.next()) else { return None };
-    Some(rows.iter().map(|r| r[only]).collect())
-}
-
-/// The path with a mark in place of each number, and the numbers.
-fn pieces(path: &Path) -> Option<(String, Vec<i64>)> {
-    let text = path.to_string_lossy();
-    let mut words = String::new();
-    for c in text.chars().map(|c| if c.is_ascii_digit() { MARK } else { c }) {
-        if c != MARK || !words.ends_with(MARK) {
-            words.push(c);
-        }
-    }
-    let digits = text.split(|c: char| !c.is_ascii_digit()).filter(|n| !n.is_empty());
-    let numbers = digits.map(|n| if n.len() <= MAX_DIGITS { n.parse().ok() } else { None }).collect::<Option<_>>()?;
-    Some((words, numbers))
 }
 
 #[cfg(test)]
