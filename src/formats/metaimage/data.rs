@@ -1,8 +1,9 @@
 //! Where the samples of a MetaImage are: after the header, in another file, or in a file for each frame or slice.
 
 use super::header::MetaImageHeader;
-use crate::shared::deflated::{Compression, Deflated, StreamOffset, check_room};
+use crate::shared::deflated::{self, Compression, check_room};
 use crate::shared::directions::Placed;
+use crate::shared::meaning::{Kind, Meaning};
 use crate::shared::pattern;
 use crate::shared::pieces::{Piece, Pieces, Stream};
 use std::path::{Path, PathBuf};
@@ -12,19 +13,22 @@ use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::Parsed;
 use wavesplat_core::source::file_header::check_size;
-use wavesplat_core::source::layout::{Axis, Layout, Shape};
+use wavesplat_core::source::layout::{Layout, Shape};
 use wavesplat_core::source::parts::{DataLocation, Part, Stored};
 
 /// The type and layout of the samples, whichever file has them.
 pub(super) struct MetaImageSamples {
     pub(super) axes: usize,
-    /// Voxels along its axes of space, the fastest first, as they are stored.
+    /// The lengths that the header says along x, y, z.
     pub(super) lengths: [usize; 3],
+    /// What the axes count, components first.
+    pub(super) meaning: Meaning,
     pub(super) placed: Placed,
     /// As they are when turned.
     pub(super) shape: Shape,
     /// The type of the stored numbers.
     pub(super) ty: StoredType,
+    /// The length of a fourth axis.
     pub(super) frames: usize,
     pub(super) components: usize,
     /// Which of them is meant.
@@ -35,12 +39,19 @@ pub(super) struct MetaImageSamples {
 }
 
 impl MetaImageSamples {
+    /// All samples.
+    pub(super) fn layout(&self) -> Layout {
+        self.meaning.layout(&self.placed, self.component)
+    }
+
     /// How some frames are stored.
     pub(super) fn stored(&self, frames: usize) -> Parsed<Stored> {
-        let components = Axis::single(self.component, self.components);
-        let voxels = self.placed.voxels(self.lengths);
-        let axes = [Axis::new(AxisRole::Frames, frames)].into_iter().chain(voxels).chain([components]);
-        Stored::new(&Layout(axes.collect()), self.ty, self.big_endian)
+        Stored::new(&self.layout().with_frames(frames), self.ty, self.big_endian)
+    }
+
+    /// Whether its axes count what the header says.
+    fn is_usual(&self) -> bool {
+        self.meaning == header_meaning(self.components, self.lengths, (self.axes == 4).then_some(self.frames))
     }
 
     /// Some planes as if components were voxels beside one another.
@@ -49,6 +60,13 @@ impl MetaImageSamples {
         let row = x.checked_mul(self.components).ok_or("a row of its size is too large")?;
         Shape::new([row, y, planes], self.shape.sample())
     }
+}
+
+/// Components, x, y, z and perhaps frames.
+pub(super) fn header_meaning(components: usize, [x, y, z]: [usize; 3], frames: Option<usize>) -> Meaning {
+    let usual = [(Kind::Components, components), (Kind::Voxels(0), x), (Kind::Voxels(1), y), (Kind::Voxels(2), z)];
+    let (kinds, sizes) = usual.into_iter().chain(frames.map(|frames| (Kind::Frames, frames))).unzip();
+    Meaning { sizes, kinds }
 }
 
 /// The files that hold the frames, checked for their size.
@@ -62,6 +80,9 @@ pub(super) fn parts(file: &FileBytes, header: &MetaImageHeader, samples: &MetaIm
     }
     let names = Names::parse(named, header, samples).map_err(refused)?;
     let axes = names.checked_axes(samples).map_err(refused)?;
+    if axes < samples.axes && !samples.is_usual() {
+        return Err(refused("has its samples in several files: its axes count x, y, z and time alone".into()));
+    }
     let folder = file.path().parent().unwrap_or(Path::new(""));
     let mut paths = names.names.map(|name| folder.join(name));
     let frames = if axes == samples.axes { samples.frames } else { 1 };
@@ -92,21 +113,18 @@ impl Data<'_> {
     fn part(&self, file: &FileBytes, header: u64, frames: usize) -> Result<Part> {
         let refused = |e| Error::input(file.path(), e);
         let start = self.start(file, header, self.samples.lengths[2], frames)?;
-        let one = self.samples.stored(1).map_err(refused)?;
-        let (stored, at) = if self.samples.compressed {
-            let offset = StreamOffset {
-                compression: Compression::at(file, start)?,
-                start,
-                skip: 0,
-                together: 1,
-                frames,
-                frame_bytes: one.bytes,
-            };
-            (one, DataLocation::Decoded(Box::new(Deflated::new(offset))))
-        } else {
-            (self.samples.stored(frames).map_err(refused)?, DataLocation::Byte(start))
+        let layout = match self.samples.is_usual() {
+            true => self.samples.layout().with_frames(frames),
+            false => self.samples.layout(),
         };
-        Ok(Part { path: file.path().into(), state: file.state(), frames, stored, at })
+        let (path, state) = (file.path(), file.state());
+        if self.samples.compressed {
+            let stream = deflated::Stream { compression: Compression::at(file, start)?, start, skip: 0 };
+            return stream.part(path, state, &layout, self.samples.ty, self.samples.big_endian).map_err(refused);
+        }
+        let stored = Stored::new(&layout, self.samples.ty, self.samples.big_endian).map_err(refused)?;
+        let frames = layout.len(AxisRole::Frames);
+        Ok(Part { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) })
     }
 
     /// Where the samples start. Uncompressed samples must fill the rest of the file.

@@ -1,6 +1,7 @@
 //! The text of a MetaImage header: fields, and the list of data files that may end it.
 
 use super::layout::is_known;
+use crate::shared::sequence::SequenceTimes;
 use crate::shared::words::shortened;
 use std::collections::HashMap;
 use wavesplat_core::source::Parsed;
@@ -83,6 +84,11 @@ impl MetaImageHeader {
     /// The first of some fields that mean the same.
     pub(super) fn any(&self, names: &[&str]) -> Option<&str> {
         names.iter().find_map(|name| self.get(name))
+    }
+
+    /// The times of as many frames along an axis, by the fields of programs.
+    pub(super) fn sequence(&self, axis: usize, count: usize) -> Option<SequenceTimes> {
+        SequenceTimes::find(|name| self.get(&name.to_lowercase()), axis, count)
     }
 
     /// A field that must be there.

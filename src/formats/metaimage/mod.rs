@@ -16,7 +16,7 @@ pub(crate) static FORMAT: Format = Format {
     extensions: &["mha", "mhd"],
     starts: &[],
     reader: Reader::Frames(
-        Ok(|path, options, _| read::describe(path, options.variable.as_deref())),
+        Ok(|path, options, _| read::describe(path, options)),
         Choices::Components,
     ),
     writers: &[Writer {

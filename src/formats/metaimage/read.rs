@@ -1,49 +1,52 @@
 //! Reads MetaImage.
 
-use super::data::{self, MetaImageSamples};
+use super::data::{self, MetaImageSamples, header_meaning};
 use super::header::MetaImageHeader;
 use super::layout::{BIG_ENDIAN, NAME, ORIGIN, SPACING, TRANSFORM, TYPES};
-use crate::shared::component;
 use crate::shared::directions::{Directions, Placed};
+use crate::shared::meaning::{Kind, Meaning};
+use crate::shared::sequence::{SequenceTimes, stamped_note};
 use crate::shared::words::numbers;
 use std::path::Path;
-use wavesplat_core::base::description::{Attribute, AxisRole, Description, LPS, Values};
+use wavesplat_core::base::description::{Attribute, Description, LPS, Values};
 use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::stored::StoredType;
-use wavesplat_core::source::file_header::{FileHeader, growing_head};
+use wavesplat_core::source::file_header::{FileHeader, Units, growing_head};
 use wavesplat_core::source::layout::Shape;
-use wavesplat_core::source::layout::{Axis, Layout};
-use wavesplat_core::source::{Advised, Parsed};
+use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 
 /// Reads the header and checks the size of every data file.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
+pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = growing_head(&file, MetaImageHeader::parse)?;
-    let samples = samples(&header, variable).map_err(|e| Error::input(path, e))?;
+    let samples = samples(&header, options).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &samples)?;
-    let times = times(&header, &samples).map_err(refused)?;
+    let (times, unit) = times(&header, &samples).map_err(refused)?;
     let unheeded = unheeded(&header, samples.axes).map_err(refused)?;
     let description = description(&header, &samples).map_err(refused)?;
+    let is_stamped = options.axes.is_none() && samples.axes == 3 && samples.meaning.frames() == Some(PLANES);
     let MetaImageSamples { shape, placed: Placed { spacing, origin, note, .. }, variable, .. } = samples;
-    let notes = note.into_iter().chain(unheeded).collect();
-    Ok(FileHeader { spacing, origin, times, variable, notes, description, ..FileHeader::plain(shape, parts) })
+    let notes = note.into_iter().chain(is_stamped.then(stamped_note)).chain(unheeded).collect();
+    let units = Units { times: unit, ..Units::default() };
+    Ok(FileHeader { spacing, origin, times, units, variable, notes, description, ..FileHeader::plain(shape, parts) })
 }
+
+/// The axis of planes: the fourth one, after components.
+const PLANES: usize = 3;
 
 /// The directions of the axes and the other fields of the header; `None` if the axes are plain and there are no other
 /// fields.
 fn description(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<Option<Description>> {
-    let axes = [Axis::new(AxisRole::Frames, samples.frames)].into_iter().filter(|_| samples.axes == 4);
-    let layout = Layout(axes.chain(samples.placed.voxels(samples.lengths)).collect());
     let text = |(name, value): (&str, &str)| Attribute { name: name.into(), value: Values::text(value) };
     let global: Vec<Attribute> = header.others().map(text).collect();
     let is_plain = global.is_empty() && samples.placed.is_plain();
-    let described = directions(header, samples.axes)?.description(NAME, LPS, &layout);
+    let described = directions(header, samples.axes, &samples.meaning)?.description(NAME, LPS, &samples.layout());
     Ok((!is_plain).then_some(Description { global, ..described }))
 }
 
-fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImageSamples> {
+fn samples(header: &MetaImageHeader, options: &OpenOptions) -> Advised<MetaImageSamples> {
     if header.flag(&["binarydata"])? == Some(false) {
         return Err("has its samples as text (BinaryData = False), which is not supported; write them as binary".into());
     }
@@ -56,18 +59,23 @@ fn samples(header: &MetaImageHeader, variable: Option<&str>) -> Advised<MetaImag
     if frames == 0 {
         return Err("has 0 frames".into());
     }
-    let placed = directions(header, axes)?.placed(lengths, "directions of the MetaImage");
-    let dims = Layout(placed.voxels(lengths).to_vec()).dims();
-    let ty = stored_type(header.required("ElementType")?)?;
-    let shape = Shape::new(dims, ty.sample())?;
     let components = header.get("elementnumberofchannels").unwrap_or("1");
     let components = components.parse().map_err(|_| format!("ElementNumberOfChannels {components:?} is no number"))?;
-    let (component, variable) = component::only_array(None, components, variable)?;
+    let own = header_meaning(components, lengths, (axes == 4).then_some(frames));
+    let meaning = match options.axes.as_deref() {
+        Some(letters) => by_letters(&own, letters)?,
+        None => with_sequence(header, own),
+    };
+    let (component, variable) = meaning.component(None, options.variable.as_deref())?;
+    let placed = directions(header, axes, &meaning)?.placed(meaning.lengths(), "directions of the MetaImage");
+    let ty = stored_type(header.required("ElementType")?)?;
+    let shape = Shape::new(meaning.layout(&placed, component).dims(), ty.sample())?;
     let big_endian = header.flag(&BIG_ENDIAN)?.unwrap_or(false);
     let compressed = header.flag(&["compresseddata"])?.unwrap_or(false);
     let samples = MetaImageSamples {
         axes,
         lengths,
+        meaning,
         placed,
         shape,
         ty,
@@ -89,13 +97,44 @@ fn stored_type(name: &str) -> Parsed<StoredType> {
     })
 }
 
+/// What the user's letters say: for all axes, also that of components if there are several.
+fn by_letters(own: &Meaning, letters: &str) -> Advised<Meaning> {
+    if own.components() != 1 {
+        return Meaning::by_letters(&own.sizes, letters);
+    }
+    let Meaning { mut sizes, mut kinds } = Meaning::by_letters(&own.sizes[1..], letters)?;
+    sizes.insert(0, 1);
+    kinds.insert(0, Kind::Components);
+    Ok(Meaning { sizes, kinds })
+}
+
+/// Takes planes or components as frames if they have times of their own.
+fn with_sequence(header: &MetaImageHeader, mut own: Meaning) -> Meaning {
+    let is_timed = |axis: &usize| own.sizes[*axis] > 1 && header.sequence(*axis, own.sizes[*axis]).is_some();
+    if own.frames().is_none()
+        && let Some(axis) = [0, PLANES].iter().find(|axis| is_timed(axis))
+    {
+        own.kinds[*axis] = Kind::Frames;
+    }
+    own
+}
+
 /// Where voxels are in the world.
-fn directions(header: &MetaImageHeader, axes: usize) -> Parsed<Directions> {
+fn directions(header: &MetaImageHeader, axes: usize, meaning: &Meaning) -> Parsed<Directions> {
     let matrix = matrix(header, axes)?;
     let rows = std::array::from_fn(|row| std::array::from_fn(|axis| matrix[row][axis]));
-    let along_space = |all: Vec<f64>| std::array::from_fn(|axis| all[axis]);
+    let along_space = |all: &[f64]| std::array::from_fn(|axis| all[axis]);
     let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
-    Directions::new(rows, along_space(spacing), along_space(origin))
+    let own = Directions::new(rows, along_space(&spacing), along_space(&origin))?;
+    if meaning.is_in_order() && meaning.voxels() == [1, 2, 3] {
+        return Ok(own);
+    }
+    let step = |axis: usize| {
+        let axis = axis.checked_sub(1)?;
+        let row: [f64; 3] = along_space(matrix.get(axis)?);
+        Some(row.map(|part| part * spacing[axis]))
+    };
+    Ok(meaning.directions(step, along_space(&origin)))
 }
 
 /// The direction of each axis.
@@ -105,12 +144,19 @@ fn matrix(header: &MetaImageHeader, axes: usize) -> Parsed<Vec<Vec<f64>>> {
     Ok(numbers(text, "TransformMatrix", axes * axes)?.chunks(axes).map(<[f64]>::to_vec).collect())
 }
 
-/// Times where a fourth axis has a spacing.
-fn times(header: &MetaImageHeader, &MetaImageSamples { axes, frames, .. }: &MetaImageSamples) -> Parsed<Vec<f64>> {
+/// Times that are written beside the samples, with their unit, or those of an axis of frames that has a spacing.
+fn times(header: &MetaImageHeader, samples: &MetaImageSamples) -> Parsed<(Vec<f64>, Option<String>)> {
+    let Some(axis) = samples.meaning.frames() else { return Ok((Vec::new(), None)) };
+    let frames = samples.meaning.sizes[axis];
+    if let Some(SequenceTimes { times, unit }) = header.sequence(axis, frames) {
+        return Ok((times, unit));
+    }
+    let axes = samples.axes;
     let (spacing, origin) = (per_axis(header, &SPACING, 1.0, axes)?, per_axis(header, &ORIGIN, 0.0, axes)?);
-    Ok(match (spacing.get(3), header.any(&SPACING)) {
-        (Some(step), Some(_)) if step.is_finite() => (0..frames).map(|t| origin[3] + step * t as f64).collect(),
-        _ => Vec::new(),
+    let step = axis.checked_sub(1).filter(|_| header.any(&SPACING).is_some()).map(|axis| (spacing[axis], origin[axis]));
+    Ok(match step {
+        Some((step, first)) if step.is_finite() => ((0..frames).map(|t| first + step * t as f64).collect(), None),
+        _ => (Vec::new(), None),
     })
 }
 

@@ -2,9 +2,10 @@
 
 use super::header::{LONGEST, NiftiHeader, is_nifti};
 use super::layout::{DATATYPES, OTHER_UNITS, SPACE_UNITS, TIME_UNITS, UNSUPPORTED};
-use crate::shared::component;
 use crate::shared::deflated::{Compression, Stream};
+use crate::shared::directions::Directions;
 use crate::shared::extension::extension;
+use crate::shared::meaning::{Kind, Meaning};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::description::{
@@ -15,21 +16,21 @@ use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::file_header::{FileHeader, Units, check_size, head};
 use wavesplat_core::source::layout::Shape;
-use wavesplat_core::source::layout::{Axis, Layout};
+use wavesplat_core::source::layout::Layout;
 use wavesplat_core::source::packing::Packing;
 use wavesplat_core::source::parts::{DataLocation, Part, Stored};
-use wavesplat_core::source::{Advised, Parsed};
+use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 
 const GZIP: &[u8] = b"\x1f\x8b";
 
 /// Reads the header, and checks the size of an uncompressed file.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
+pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let path = &header_of(path).unwrap_or_else(|| path.into());
     let refused = |e| Error::input(path, e);
     let (bytes, compressed) = header_bytes(path)?;
     let header = NiftiHeader::parse(&bytes).map_err(refused)?;
     let (data, compressed) = if header.pair { image_of(path)? } else { (path.clone(), compressed) };
-    let array = NiftiSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
+    let array = NiftiSamples::new(&header, options).map_err(|e| Error::input(path, e))?;
     let part = array.part(&header, &data, compressed)?;
     let description = array.description(&header, &bytes[..header.len]);
     Ok(FileHeader { description: Some(description), ..array.described(&header, part) })
@@ -75,11 +76,11 @@ fn header_bytes(path: &Path) -> Result<(Vec<u8>, bool)> {
 
 /// The samples that are meant.
 struct NiftiSamples {
+    meaning: Meaning,
     layout: Layout,
     shape: Shape,
     ty: StoredType,
     packing: Option<Packing>,
-    components: usize,
     /// The properties that do not depend on where the samples are.
     known: Placement,
 }
@@ -93,13 +94,12 @@ struct Placement {
 }
 
 impl NiftiSamples {
-    fn new(header: &NiftiHeader, variable: Option<&str>) -> Advised<Self> {
-        let [x, y, z, frames, components] = lengths(&header.dim)?;
+    fn new(header: &NiftiHeader, options: &OpenOptions) -> Advised<Self> {
+        let meaning = meaning(header, options.axes.as_deref())?;
         let own = Some(header.intent_name.as_str()).filter(|name| !name.is_empty());
-        let (index, variable) = component::only_array(own, components, variable)?;
-        let placed = header.directions().placed([x, y, z], "directions of the NIfTI");
-        let slow = [Axis::single(index, components), Axis::new(AxisRole::Frames, frames)];
-        let layout = Layout(slow.into_iter().chain(placed.voxels([x, y, z])).collect());
+        let (index, variable) = meaning.component(own, options.variable.as_deref())?;
+        let placed = directions(header, &meaning).placed(meaning.lengths(), "directions of the NIfTI");
+        let layout = meaning.layout(&placed, index);
         let ty = stored_type(header.datatype)?;
         let packing = packing(header)?;
         let sample = packing.as_ref().map_or(ty.sample(), |packing| packing.sample(ty.sample()));
@@ -110,7 +110,7 @@ impl NiftiSamples {
             variable,
             notes: placed.note.into_iter().collect(),
         };
-        Ok(Self { layout, shape, ty, packing, components, known })
+        Ok(Self { meaning, layout, shape, ty, packing, known })
     }
 
     fn part(&self, header: &NiftiHeader, data: &Path, compressed: bool) -> Result<Part> {
@@ -124,7 +124,7 @@ impl NiftiSamples {
             stream.part(data, file.state(), &self.layout, self.ty, big_endian).map_err(refused)?
         } else {
             let stored = Stored::new(&self.layout, self.ty, big_endian).map_err(refused)?;
-            check_size(file.len(), start, &self.shape, self.ty, frames * self.components).map_err(refused)?;
+            check_size(file.len(), start, &self.shape, self.ty, frames * self.meaning.components()).map_err(refused)?;
             Part { path: data.into(), state: file.state(), frames, stored, at: DataLocation::Byte(start) }
         };
         part.stored.packing.clone_from(&self.packing);
@@ -133,21 +133,47 @@ impl NiftiSamples {
 
     /// The directions of the axes, and the whole header, which extracted files of the format repeat.
     fn description(&self, header: &NiftiHeader, bytes: &[u8]) -> Description {
-        let described = header.directions().description("NIfTI", RAS, &self.layout);
+        let described = directions(header, &self.meaning).description("NIfTI", RAS, &self.layout);
         let value = Values::Numbers(Numbers::new(NumberType::U8, bytes));
         Description { global: vec![Attribute { name: NIFTI_HEADER.into(), value }], ..described }
     }
 
     fn described(self, header: &NiftiHeader, part: Part) -> FileHeader {
         let Placement { spacing, origin, variable, notes } = self.known;
-        let times = times(header, part.frames);
+        let times = self.meaning.frames().map_or_else(Vec::new, |axis| times(header, axis, part.frames));
         let units = Units {
             space: space_unit(header.units).map(String::from),
-            times: time_unit(header.units).filter(|_| !times.is_empty()).map(String::from),
+            times: time_unit(header.units)
+                .filter(|_| !times.is_empty() && self.meaning.frames() == Some(FRAMES))
+                .map(String::from),
             ..Units::default()
         };
         FileHeader { spacing, origin, times, variable, units, notes, ..FileHeader::plain(self.shape, vec![part]) }
     }
+}
+
+/// The axis of frames.
+const FRAMES: usize = 3;
+
+/// What the axes count: x, y, z, frames and components, or what the user's letters say.
+fn meaning(header: &NiftiHeader, letters: Option<&str>) -> Advised<Meaning> {
+    let sizes = lengths(&header.dim)?.to_vec();
+    let mut usual = vec![Kind::Voxels(0), Kind::Voxels(1), Kind::Voxels(2), Kind::Frames, Kind::Components];
+    let Some(letters) = letters else { return Ok(Meaning { sizes, kinds: usual }) };
+    let own = (header.dim[0] as usize).min(sizes.len());
+    let Meaning { mut kinds, .. } = Meaning::by_letters(&sizes[..own], letters)?;
+    kinds.extend(usual.split_off(own).into_iter().map(|_| Kind::Components));
+    Ok(Meaning { sizes, kinds })
+}
+
+/// Where voxels are in the world.
+fn directions(header: &NiftiHeader, meaning: &Meaning) -> Directions {
+    let own = header.directions();
+    if meaning.is_in_order() && meaning.voxels() == [0, 1, 2] {
+        return own;
+    }
+    let first = own.first;
+    meaning.directions(|axis| own.steps().get(axis).copied(), first)
 }
 
 /// Lengths of x, y, z, time and components.
@@ -201,9 +227,10 @@ fn start(header: &NiftiHeader) -> Parsed<u64> {
     Ok(offset as u64)
 }
 
-/// Times of several frames, if a step says how far they are apart.
-fn times(header: &NiftiHeader, frames: usize) -> Vec<f64> {
-    let (first, step) = (header.toffset, header.pixdim[4]);
+/// Times of several frames along an axis, if a step says how far they are apart.
+fn times(header: &NiftiHeader, axis: usize, frames: usize) -> Vec<f64> {
+    let first = if axis == FRAMES { header.toffset } else { 0.0 };
+    let step = if axis <= FRAMES { header.pixdim[axis + 1] } else { f64::NAN };
     if frames == 1 || !(step.is_finite() && step > 0.0 && first.is_finite()) {
         return Vec::new();
     }

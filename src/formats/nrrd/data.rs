@@ -68,7 +68,7 @@ pub(super) fn parts(file: &FileBytes, header: &NrrdHeader, array: &NrrdSamples) 
 impl NrrdSamples {
     /// How many files there must be, and whether each holds whole frames.
     fn split(&self, files: &DataFiles) -> Parsed<(usize, bool)> {
-        let sizes = &self.axes.sizes;
+        let sizes = &self.axes.meaning.sizes;
         let slowest = sizes.len() - 1;
         let (axes, count) = (files.axes().unwrap_or(slowest), files.count()?);
         if !(1..=sizes.len()).contains(&axes) {
@@ -127,7 +127,7 @@ impl NrrdSamples {
     /// Frames that are in several files: one after another, or all together. Bytes count as voxels, which lie in a row.
     fn joined(&self, file: &FileBytes, pieces: Vec<Piece>, bytes: usize) -> Parsed<Part> {
         let frames = self.axes.len(self.axes.frames);
-        let in_turn = frames == 1 || self.axes.frames == Some(self.axes.sizes.len() - 1);
+        let in_turn = frames == 1 || self.axes.frames == Some(self.axes.meaning.sizes.len() - 1);
         let together = if in_turn { 1 } else { frames };
         let layout = self.layout.clone().with_frames(together);
         let stored = Stored::new(&layout, self.ty, self.big_endian)?;

@@ -1,6 +1,7 @@
 //! The text of a NRRD header: fields, and the list of data files that may end it.
 
 use super::layout::MAGIC;
+use crate::shared::sequence::SequenceTimes;
 use std::collections::HashMap;
 use wavesplat_core::source::Parsed;
 
@@ -78,14 +79,26 @@ impl NrrdHeader {
         self.fields.get(name).map(String::as_str)
     }
 
+    /// Vectors in the world.
+    pub(super) fn vectors(&self, text: &str) -> Parsed<Vec<Option<Vec<f64>>>> {
+        vectors(text, self.get("spacedimension") == Some("2"))
+    }
+
+    /// The times of as many frames along an axis, by the keys of programs.
+    pub(super) fn sequence(&self, axis: usize, count: usize) -> Option<SequenceTimes> {
+        let get = |name: &str| self.keys.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str());
+        SequenceTimes::find(get, axis, count)
+    }
+
     /// A field that must be there.
     pub(super) fn required(&self, name: &str) -> Parsed<&str> {
         self.get(name).ok_or_else(|| format!("its header does not say {name}"))
     }
 }
 
-/// Vectors such as `(1,0,0)`, of three numbers or with time of four, and `none` between them.
-pub(super) fn vectors(text: &str) -> Parsed<Vec<Option<Vec<f64>>>> {
+/// Vectors such as `(1,0,0)`, of three numbers or with time of four, in a plane of two; and `none` between them.
+fn vectors(text: &str, are_of_plane: bool) -> Parsed<Vec<Option<Vec<f64>>>> {
+    let numbers = if are_of_plane { 2..=3 } else { 3..=4 };
     let wrong = || format!("{text:?} is not made of vectors of three numbers such as (1,0,0)");
     let (mut vectors, mut left) = (Vec::new(), text.trim_start());
     while !left.is_empty() {
@@ -99,7 +112,9 @@ pub(super) fn vectors(text: &str) -> Parsed<Vec<Option<Vec<f64>>>> {
             continue;
         };
         let vector: Option<Vec<f64>> = inside.split(',').map(|n| n.trim().parse().ok()).collect();
-        vectors.push(Some(vector.filter(|v| matches!(v.len(), 3 | 4)).ok_or_else(wrong)?));
+        let mut vector = vector.filter(|v| numbers.contains(&v.len())).ok_or_else(wrong)?;
+        vector.resize(vector.len().max(3), 0.0);
+        vectors.push(Some(vector));
         left = rest.trim_start();
     }
     Ok(vectors)

@@ -19,7 +19,7 @@ pub(crate) static FORMAT: Format = Format {
     extensions: &["nrrd", "nhdr"],
     starts: &[layout::MAGIC],
     reader: Reader::Frames(
-        Ok(|path, options, _| read::describe(path, options.variable.as_deref())),
+        Ok(|path, options, _| read::describe(path, options)),
         Choices::Components,
     ),
     writers: &[

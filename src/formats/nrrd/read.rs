@@ -4,31 +4,31 @@ use super::axes::Axes;
 use super::data::{self, NrrdSamples};
 use super::header::NrrdHeader;
 use super::layout::{NAME, TYPES};
-use crate::shared::component;
 use crate::shared::directions::Placed;
+use crate::shared::sequence::stamped_note;
 use std::path::Path;
-use wavesplat_core::base::description::{Attribute, AxisRole, Description, Values};
+use wavesplat_core::base::description::{Attribute, Description, Values};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::file_header::{FileHeader, growing_head};
 use wavesplat_core::source::layout::Shape;
-use wavesplat_core::source::layout::{Axis, Layout};
-use wavesplat_core::source::{Advised, Parsed};
+use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 
 /// Reads the header and checks the size of every data file that is not compressed.
-pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader> {
+pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let refused = |e| Error::input(path, e);
     let file = FileBytes::open(path, Access::Read)?;
     let header = growing_head(&file, NrrdHeader::parse)?;
-    let array = NrrdSamples::new(&header, variable).map_err(|e| Error::input(path, e))?;
+    let array = NrrdSamples::new(&header, options).map_err(|e| Error::input(path, e))?;
     let parts = data::parts(&file, &header, &array)?;
     let description = description(&header, &array).map_err(refused)?;
     let times = array.axes.times(&header).map_err(refused)?;
     let units = array.axes.units(&header);
+    let stamped = array.axes.is_stamped.then(stamped_note);
     let NrrdSamples { shape, placed, variable, .. } = array;
     let Placed { spacing, origin, note, .. } = placed;
-    let notes = note.into_iter().collect();
+    let notes = note.into_iter().chain(stamped).collect();
     Ok(FileHeader { spacing, origin, times, units, variable, notes, description, ..FileHeader::plain(shape, parts) })
 }
 
@@ -42,19 +42,18 @@ fn description(header: &NrrdHeader, array: &NrrdSamples) -> Parsed<Option<Descri
 }
 
 impl NrrdSamples {
-    fn new(header: &NrrdHeader, variable: Option<&str>) -> Advised<Self> {
+    fn new(header: &NrrdHeader, options: &OpenOptions) -> Advised<Self> {
         let gzip = is_gzip(header.required("encoding")?)?;
-        let axes = Axes::parse(header)?;
+        let axes = Axes::parse(header, options.axes.as_deref())?;
         if axes.len(axes.frames) == 0 {
             return Err("has 0 frames".into());
         }
-        if axes.len(axes.components) == 0 {
+        if axes.meaning.components() == 0 {
             return Err("has 0 components".into());
         }
-        let (index, variable) = component::only_array(None, axes.len(axes.components), variable)?;
-        let placed =
-            axes.placed(header)?.placed(axes.voxels.map(|axis| axes.sizes[axis]), "space directions of the NRRD");
-        let layout = layout(&axes, &placed, index);
+        let (index, variable) = axes.meaning.component(None, options.variable.as_deref())?;
+        let placed = axes.placed(header)?.placed(axes.meaning.lengths(), "space directions of the NRRD");
+        let layout = axes.meaning.layout(&placed, index);
         let ty = stored_type(header.required("type")?)?;
         let shape = Shape::new(layout.dims(), ty.sample())?;
         layout.bytes(ty.size())?;
@@ -68,15 +67,6 @@ fn is_gzip(encoding: &str) -> Parsed<bool> {
         "gzip" | "gz" => Ok(true),
         other => Err(format!("encoding {other} is not supported; only raw and gzip are")),
     }
-}
-
-fn layout(axes: &Axes, placed: &Placed, component: usize) -> Layout {
-    let axis = |(axis, len): (usize, &usize)| match axes.voxels.iter().position(|of| *of == axis) {
-        Some(of) => Axis { backwards: placed.axes[of].1, ..Axis::new(AxisRole::of_voxels(placed.axes[of].0), *len) },
-        None if axes.frames == Some(axis) => Axis::new(AxisRole::Frames, *len),
-        None => Axis::single(component, *len),
-    };
-    Layout(axes.sizes.iter().enumerate().map(axis).rev().collect())
 }
 
 fn big_endian(header: &NrrdHeader, ty: StoredType) -> Parsed<bool> {

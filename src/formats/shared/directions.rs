@@ -48,7 +48,7 @@ impl Directions {
     }
 
     /// From a voxel to the next along each axis.
-    fn steps(&self) -> [[f64; 3]; 3] {
+    pub(crate) fn steps(&self) -> [[f64; 3]; 3] {
         std::array::from_fn(|axis| self.directions[axis].map(|c| c * self.spacing[axis]))
     }
 

@@ -13,10 +13,9 @@ pub(super) fn parse(said: &str, pages: usize, pixels_per_unit: [Option<f64>; 2])
     let count = |name: &str| get(name).map(|text| number::<usize>(text, name)).transpose();
     let length = |name: &str| get(name).and_then(|text| text.parse().ok()).and_then(positive);
     let (channels, slices, frames) = (count("channels")?, count("slices")?, count("frames")?);
-    if count("images")?.is_some_and(|images| images > 1 && pages == 1) {
-        return Err("has one page of the images that ImageJ wrote: save it as OME-TIFF or in several files".into());
-    }
-    let planes = if channels.is_none() && slices.is_none() && frames.is_none() { Some(pages) } else { slices };
+    // Beyond 4 GB ImageJ writes one page, and all images behind each other.
+    let images = count("images")?.filter(|_| pages == 1).unwrap_or(pages);
+    let planes = if channels.is_none() && slices.is_none() && frames.is_none() { Some(images) } else { slices };
     let lengths = [channels.unwrap_or(1), planes.unwrap_or(1), frames.unwrap_or(1)];
     let [x, y] = pixels_per_unit.map(|pixels| pixels.and_then(positive).map(f64::recip));
     let unit = get("unit").filter(|unit| !matches!(*unit, "" | "pixel" | "pixels" | "inch"));

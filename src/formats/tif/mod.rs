@@ -1,5 +1,5 @@
-//! TIFF: the pages of a file are the planes of a volume along z. OME-XML or ImageJ's text in the first page divides
-//! them into frames and channels.
+//! TIFF: the pages of a file are the planes of a volume along z. OME-XML, ImageJ's text or tifffile's JSON in the first
+//! page divides them into frames and channels; so does the option `axes`.
 
 #[cfg(feature = "tiff")]
 mod imagej;
@@ -9,6 +9,8 @@ mod ome;
 mod pages;
 #[cfg(feature = "tiff")]
 mod read;
+#[cfg(feature = "tiff")]
+mod shaped;
 #[cfg(feature = "tiff")]
 mod stack;
 #[cfg(all(test, feature = "tiff"))]

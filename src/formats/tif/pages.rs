@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingSampleType, Limits};
-use tiff::tags::Tag;
+use tiff::tags::{ByteOrder, Tag};
 use tiff::{TiffError, TiffResult};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::stored::StoredType;
@@ -41,6 +41,8 @@ pub(super) struct Page {
     pub(super) ty: StoredType,
     /// Pixels of a strip or tile along x and y; it may extend beyond the page.
     chunk: [usize; 2],
+    /// Whether it says that 0 is white: then the decoder inverts samples, which are to be as they are stored.
+    is_inverted: bool,
 }
 
 impl Page {
@@ -115,6 +117,41 @@ impl Pages {
         Ok(count)
     }
 
+    /// Whether numbers have their most significant byte first.
+    pub(super) fn is_big_endian(&self) -> bool {
+        self.decoder.byte_order() == ByteOrder::BigEndian
+    }
+
+    /// Where the samples of all pages start, if the file has one page alone and they lie behind each other.
+    pub(super) fn contiguous(&mut self, page: &Page, bytes: u64, len: u64) -> Result<u64> {
+        let start = self.start(page).map_err(|e| refused(&self.path, &e))?;
+        match start {
+            Some(start) if start.checked_add(bytes).is_some_and(|end| end <= len) => Ok(start),
+            Some(start) => {
+                let found = len.saturating_sub(start);
+                let what = format!("has one page of the images that it says, and {found} bytes of samples, not {bytes}");
+                Err(Error::input(&self.path, what))
+            }
+            None => {
+                let what = "has one page of the images that it says, and this is compressed or in pieces";
+                Err(Error::input(&self.path, what))
+            }
+        }
+    }
+
+    /// Where the samples of this page start, if they are not compressed and lie in one piece.
+    fn start(&mut self, page: &Page) -> TiffResult<Option<u64>> {
+        let compression = self.decoder.find_tag_unsigned::<u16>(Tag::Compression)?.unwrap_or(1);
+        let is_tiled = self.decoder.find_tag_unsigned::<u32>(Tag::TileWidth)?.is_some();
+        if compression != 1 || is_tiled {
+            return Ok(None);
+        }
+        let starts = self.decoder.get_tag_u64_vec(Tag::StripOffsets)?;
+        let strip = page.chunk_bytes() as u64;
+        let is_joined = starts.windows(2).all(|pair| pair[0].checked_add(strip) == Some(pair[1]));
+        Ok(starts.first().copied().filter(|_| is_joined))
+    }
+
     fn check(&mut self, index: usize, first: &Page) -> Result<()> {
         let found = self.page()?;
         if (found.dims, found.ty) != (first.dims, first.ty) {
@@ -145,6 +182,9 @@ impl Pages {
         for (chunk, ([i, j], [w, h])) in page.chunks().enumerate() {
             self.read_chunk(chunk, w * h * size, &mut bytes)
                 .map_err(|e| Error::input(&self.path, format!("page {index} cannot be decoded: {e}")))?;
+            if page.is_inverted {
+                bytes.iter_mut().for_each(|byte| *byte = !*byte);
+            }
             if cfg!(target_endian = "big") {
                 page.ty.swap_endian(&mut bytes);
             }
@@ -192,7 +232,11 @@ fn page(decoder: &mut Decoder<BufReader<File>>) -> TiffResult<Parsed<Page>> {
         Some(ty) => stored_type(ty),
         None => return Ok(Err(unsupported("its type of samples"))),
     };
-    Ok(Ok(Page { dims, ty, chunk }))
+    let is_inverted = decoder.find_tag_unsigned::<u16>(Tag::PhotometricInterpretation)? == Some(0);
+    if is_inverted && !matches!(ty, StoredType::U8 | StoredType::U16 | StoredType::U32 | StoredType::U64) {
+        return Ok(Err(unsupported(&format!("{ty} samples of which 0 is white"))));
+    }
+    Ok(Ok(Page { dims, ty, chunk, is_inverted }))
 }
 
 /// Pixels of a strip or tile; a tile may go beyond the page.
