@@ -59,7 +59,7 @@ pub struct InputArgs {
     /// Read the length of a vector: the names of its components' arrays, separated by commas
     #[arg(long, value_name = "NAMES", conflicts_with = "variable", value_delimiter = ',', help_heading = "Input")]
     pub magnitude: Vec<String>,
-    /// Meaning of the axes of an array in HDF5, NetCDF or Zarr, slowest first: letters of tzyx, c for another axis
+    /// Meaning of the axes of a file's array, slowest first: letters of tzyx, c for another axis
     #[arg(long, value_name = "LETTERS", help_heading = "Input")]
     pub axes: Option<String>,
     /// World units between voxels, instead of those in the files: SX,SY,SZ

@@ -2,9 +2,11 @@
 
 use super::format::{Choices, Format, Reader};
 use super::writer::Writer;
+use crate::shared::meaning::Meaning;
 use std::path::Path;
+use wavesplat_core::base::description::AxisRole;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
-use wavesplat_core::base::mapped::{Access, FileBytes};
+use wavesplat_core::base::mapped::{Access, FileBytes, State};
 use wavesplat_core::source::OpenOptions;
 use wavesplat_core::source::file_header::{FileHeader, check_size};
 use wavesplat_core::source::layout::Shape;
@@ -50,6 +52,9 @@ fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
         Some(_) if options.dims_are_remembered => usize::try_from(room).unwrap_or(usize::MAX).max(1),
         frames => frames.unwrap_or(1),
     };
+    if let Some(letters) = options.axes.as_deref() {
+        return relabelled(path, state, letters, options);
+    }
     check_size(state.len, options.offset, &shape, shape.sample().into(), count)
         .map_err(|what| Error::input(path, Note::with(what, remedy(state.len, &shape, options))))?;
     let stored = Stored::plain(shape.dims(), count, shape.sample(), options.big_endian);
@@ -57,6 +62,25 @@ fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let at = DataLocation::Byte(options.offset);
     let part = Part { path: path.into(), state, frames: count, stored, at };
     Ok(FileHeader::plain(shape, vec![part]))
+}
+
+/// The samples whose axes count what the user's letters say, slowest first.
+fn relabelled(path: &Path, state: State, letters: &str, options: &OpenOptions) -> Result<FileHeader> {
+    let refused = |e| Error::setting("axes", e);
+    let (dims, Some(sample)) = (options.dims.as_deref().unwrap_or_default(), options.sample) else {
+        return Err(Error::setting("sample", "is needed"));
+    };
+    let meaning = Meaning::by_letters(dims, letters).map_err(refused)?;
+    if meaning.components() > 1 {
+        return Err(Error::setting("axes", "headerless data has voxels and frames alone"));
+    }
+    let layout = meaning.plain_layout(0);
+    let shape = Shape::new(layout.dims(), sample).map_err(|e| Error::setting("dims", e))?;
+    let frames = layout.len(AxisRole::Frames);
+    check_size(state.len, options.offset, &shape, sample.into(), frames).map_err(|what| Error::input(path, what))?;
+    let stored = Stored::new(&layout, sample, options.big_endian).map_err(|e| Error::setting("dims", e))?;
+    let at = DataLocation::Byte(options.offset);
+    Ok(FileHeader::plain(shape, vec![Part { path: path.into(), state, frames, stored, at }]))
 }
 
 /// What to try when the size is wrong.

@@ -191,16 +191,19 @@ impl Archive {
         }
     }
 
-    /// Whether its first frames have these times; true if it has no times.
-    pub fn begins_with_times(&self, times: &[f64]) -> bool {
-        let own = self.times_of(0..times.len().min(self.frames.unwrap_or(usize::MAX)));
-        own.iter().zip(times).all(|(own, time)| own.to_bits() == time.to_bits())
+    /// Whether its first `frames` frames have these times, or have none if there are none.
+    pub fn begins_with_times(&self, times: &[f64], frames: usize) -> bool {
+        let count = frames.min(self.frames.unwrap_or(usize::MAX));
+        let own = self.times_of(0..count);
+        let times = &times[..times.len().min(count)];
+        own.len() == times.len() && own.iter().zip(times).all(|(own, time)| own.to_bits() == time.to_bits())
     }
 
     /// The times of the frames, and how they are written.
     pub fn time_labels(&self) -> TimeLabels {
         let Units { times, calendar, .. } = &self.units;
-        TimeLabels::new(self.times.clone(), times.as_deref(), calendar.as_deref())
+        let all = self.frames.map_or_else(|| self.times.clone(), |frames| self.times_of(0..frames));
+        TimeLabels::new(all, times.as_deref(), calendar.as_deref())
     }
 
     /// The value that stands for missing samples besides NaN and infinities: the one that is `given`, or that of the

@@ -348,7 +348,8 @@ impl WindowsDone {
             return Err(Error::path(name, "was begun with other settings"));
         }
         let first = held.windows.get(*first_window).map_or(held.frames, |window| window.first_frame);
-        if !archive.begins_with_times(held.times.get(first as usize..).unwrap_or_default()) {
+        let frames = held.frames.saturating_sub(first) as usize;
+        if !archive.begins_with_times(held.times.get(first as usize..).unwrap_or_default(), frames) {
             return Err(Error::path(name, "was begun with other times"));
         }
         Ok(Self {

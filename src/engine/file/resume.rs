@@ -120,7 +120,8 @@ pub fn check(part: &Path) -> Result<()> {
 pub fn is_complete(path: &Path, like: &wavesplat_format::Metadata, archive: &Archive) -> Result<bool> {
     let file = CoefficientFile::open_with(path, Access::Read)?;
     let is_long = archive.frames.is_none_or(|frames| frames == file.frames());
-    Ok(is_long && file.metadata().start() == *like && archive.begins_with_times(&file.metadata().times))
+    let has_times = archive.begins_with_times(&file.metadata().times, file.frames());
+    Ok(is_long && file.metadata().start() == *like && has_times)
 }
 
 /// Whether a file ends with windows of exactly the frames of `source`, judged by their digests. False if the source

@@ -1,4 +1,4 @@
-//! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x), in C or Fortran order. `base::npy` has its header.
+//! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x) or of the axes that the user says, in C or Fortran order. `base::npy` has its header.
 
 mod read;
 
@@ -13,7 +13,7 @@ pub(crate) static FORMAT: Format = Format {
     name: "NumPy array",
     extensions: &["npy"],
     starts: &[MAGIC],
-    reader: Reader::Frames(Ok(|path, _, _| read::describe(path)), Choices::None),
+    reader: Reader::Frames(Ok(|path, options, _| read::describe(path, options)), Choices::None),
     // one array (frames, z, y, x)
     writers: &[Writer {
         name: "npy",

@@ -3,15 +3,16 @@
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
-use wavesplat_core::base::error::{Error, Result};
+use crate::shared::meaning::{Kind, Meaning};
+use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::npy::{Header, MAGIC};
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::base::stored::StoredType;
-use wavesplat_core::source::Parsed;
+use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 use wavesplat_core::source::file_header::{FileHeader, check_size};
-use wavesplat_core::source::layout::Layout;
-use wavesplat_core::source::layout::Shape;
+use wavesplat_core::source::layout::{Layout, Shape};
 use wavesplat_core::source::parts::{DataLocation, Part, Stored};
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
@@ -29,8 +30,10 @@ pub(crate) struct Array {
     pub(crate) frames: usize,
     /// Whether numbers have their most significant byte first.
     pub(crate) big_endian: bool,
-    /// Whether the first axis is the fastest.
-    pub(crate) is_fortran: bool,
+    /// The order in which its numbers lie.
+    pub(crate) layout: Layout,
+    /// The component that is meant, if the user's letters say that there are several.
+    pub(crate) variable: Option<String>,
     /// Bytes before the first number.
     pub(crate) start: u64,
 }
@@ -64,38 +67,43 @@ pub fn array_header(path: &Path) -> Result<ArrayHeader> {
 }
 
 /// Reads the header of one file and checks its size.
-pub(crate) fn describe(path: &Path) -> Result<FileHeader> {
+pub(crate) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let state = FileBytes::open(path, Access::Read)?.state();
     let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
     let refused = |e| Error::input(path, e);
-    let array = read_any(&mut BufReader::with_capacity(256, file), path)?;
-    check_size(state.len, array.start, &array.shape, array.ty, array.frames).map_err(refused)?;
-    let stored = Stored::new(&array.layout(), array.ty, array.big_endian).map_err(refused)?;
-    let Array { shape, frames, start, .. } = array;
+    let array = read_any(&mut BufReader::with_capacity(256, file), path, options)?;
+    check_size(state.len, array.start, &array.shape, array.ty, array.numbers()).map_err(refused)?;
+    let stored = Stored::new(&array.layout, array.ty, array.big_endian).map_err(refused)?;
+    let notes = array.guess(options).into_iter().collect();
+    let Array { shape, frames, start, variable, .. } = array;
     let part = Part { path: path.into(), state, frames, stored, at: DataLocation::Byte(start) };
-    Ok(FileHeader::plain(shape, vec![part]))
+    Ok(FileHeader { variable, notes, ..FileHeader::plain(shape, vec![part]) })
 }
 
 /// Reads up to the first number, and not a byte further; an array in Fortran order is refused.
 pub(crate) fn read_header(reader: &mut impl Read, path: &Path) -> Result<Array> {
     let found = any_header(reader, path)?;
     found.refuse_fortran(path)?;
-    found.volumes().map_err(|e| Error::input(path, e))
+    found.volumes(&OpenOptions::default()).map_err(|e| Error::input(path, e))
 }
 
-/// Reads up to the first number of an array in any order.
-pub(crate) fn read_any(reader: &mut impl Read, path: &Path) -> Result<Array> {
-    any_header(reader, path)?.volumes().map_err(|e| Error::input(path, e))
+/// Reads up to the first number of an array in any order, whose axes may be those of the options.
+pub(crate) fn read_any(reader: &mut impl Read, path: &Path, options: &OpenOptions) -> Result<Array> {
+    any_header(reader, path)?.volumes(options).map_err(|e| Error::input(path, e))
 }
 
 impl Array {
-    /// The order in which its numbers lie.
-    pub(crate) fn layout(&self) -> Layout {
-        let mut layout = Layout::plain(self.shape.dims(), self.frames);
-        if self.is_fortran {
-            layout.0.reverse();
-        }
-        layout
+    /// Its size in frames, with all components.
+    fn numbers(&self) -> usize {
+        let single = self.layout.0.iter().filter(|axis| axis.role == AxisRole::Single);
+        single.fold(self.frames, |all, axis| all.saturating_mul(axis.len))
+    }
+
+    /// A note on a single frame, whose axes may be others.
+    pub(crate) fn guess(&self, options: &OpenOptions) -> Option<Note> {
+        let [x, y, z] = self.shape.dims();
+        let text = format!("the axes [{z}, {y}, {x}] are taken as zyx, slowest first: one frame");
+        (self.axes == 3 && options.axes.is_none()).then(|| Note::with(text, Remedy::Set("axes")))
     }
 }
 
@@ -151,15 +159,40 @@ impl AnyHeader {
         Err(Error::input(path, what))
     }
 
-    fn volumes(self) -> Parsed<Array> {
-        let (dims, frames) = dims(&self.lengths)?;
+    fn volumes(self, options: &OpenOptions) -> Advised<Array> {
+        let (meaning, component, variable) = self.meaning(options)?;
+        let Self { ty, big_endian, is_fortran, start, lengths } = self;
+        let axes = lengths.len();
+        let mut layout = meaning.plain_layout(component);
+        let frames = layout.len(AxisRole::Frames);
         if frames == 0 {
             return Err("its array has 0 frames".into());
         }
-        let Self { ty, big_endian, is_fortran, start, lengths } = self;
-        let axes = lengths.len();
-        Layout::plain(dims, frames).bytes(ty.size())?;
-        Ok(Array { shape: Shape::new(dims, ty.sample())?, ty, axes, frames, big_endian, is_fortran, start })
+        layout.bytes(ty.size())?;
+        let shape = Shape::new(layout.dims(), ty.sample())?;
+        if is_fortran {
+            layout.0.reverse();
+        }
+        Ok(Array { shape, ty, axes, frames, big_endian, layout, variable, start })
+    }
+
+    /// What its axes count, the component that is meant, and its name.
+    fn meaning(&self, options: &OpenOptions) -> Advised<(Meaning, usize, Option<String>)> {
+        let number = |n: &u64| usize::try_from(*n).map_err(|_| format!("a length of {n} is too large"));
+        let sizes: Vec<usize> = self.lengths.iter().rev().map(number).collect::<Parsed<_>>()?;
+        if let Some(letters) = options.axes.as_deref() {
+            let meaning = Meaning::by_letters(&sizes, letters)?;
+            let variable = options.variable.as_deref().filter(|_| meaning.components() > 1);
+            let (component, variable) = meaning.component(None, variable)?;
+            return Ok((meaning, component, variable));
+        }
+        if !(3..=4).contains(&sizes.len()) {
+            let supported = "supported are (z, y, x) and (t, z, y, x)";
+            let text = format!("its array has {} dimension(s); {supported}", sizes.len());
+            return Err(Note::with(text, Remedy::Set("axes")));
+        }
+        let kinds = [Kind::Voxels(0), Kind::Voxels(1), Kind::Voxels(2), Kind::Frames][..sizes.len()].to_vec();
+        Ok((Meaning { sizes, kinds }, 0, None))
     }
 }
 
@@ -172,20 +205,10 @@ fn parse(text: &[u8], start: u64) -> Parsed<AnyHeader> {
     Ok(AnyHeader { lengths: shape, ty, big_endian, is_fortran, start })
 }
 
-fn dims(shape: &[u64]) -> Parsed<([usize; 3], usize)> {
-    let number = |n: u64| usize::try_from(n).map_err(|_| format!("a length of {n} is too large"));
-    match *shape {
-        [z, y, x] => Ok(([number(x)?, number(y)?, number(z)?], 1)),
-        [t, z, y, x] => Ok(([number(x)?, number(y)?, number(z)?], number(t)?)),
-        _ => Err(format!("its array has {} dimension(s); supported are (z, y, x) and (t, z, y, x)", shape.len())),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::{Folder, check_inputs, payload, refused, survives_damage};
-    use wavesplat_core::source::OpenOptions;
 
     fn npy(version: u8, dict: &str, payload: &[u8]) -> Vec<u8> {
         let text = format!("{dict}\n");

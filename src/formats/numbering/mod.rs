@@ -6,7 +6,7 @@ mod dates;
 mod names;
 mod order;
 
-pub(crate) use order::{Planes, sort};
+pub(crate) use order::{Planes, order, sort};
 
 use names::{Column, Name, Reading, Style};
 use order::{Found, found};
@@ -72,7 +72,7 @@ pub(crate) fn check_one_series(paths: &[PathBuf]) -> Result<()> {
     }
     let what = format!("{} and {} look like two series", name(first), name(other));
     let text = format!("{what}; a pattern in quotes chooses one");
-    Err(Error::input(other, Note::with(text, Remedy::AllowGaps)))
+    Err(Error::input(other, text))
 }
 
 /// The name of a file without its folder.
@@ -113,6 +113,9 @@ fn usual_step(steps: &[i128]) -> i128 {
     let best = counts.into_iter().max_by_key(|(step, count)| (*count, std::cmp::Reverse(step.unsigned_abs()), *step));
     best.map_or(0, |(step, _)| step)
 }
+
+#[cfg(test)]
+mod order_tests;
 
 #[cfg(test)]
 mod tests {

@@ -54,6 +54,23 @@ pub(crate) fn sort(paths: &mut Vec<PathBuf>) -> Result<Option<Planes>> {
     Ok(planes)
 }
 
+/// The order of names by the numbers in them, for a series that has one number.
+///
+/// # Errors
+/// Numbers that can be read in two ways.
+pub(crate) fn order(names: &[PathBuf]) -> Result<Vec<usize>> {
+    match found(names) {
+        Found::One { numbers, .. } => Ok(numbers.order()),
+        Found::Several(several) => Err(several.refused(names, None)),
+        Found::Unclear { at } => Err(unclear(at.map(|at| names[at].as_path()))),
+        Found::Nothing => {
+            let mut order: Vec<usize> = (0..names.len()).collect();
+            order.sort_by(|a, b| alphanumeric_sort::compare_path(&names[*a], &names[*b]));
+            Ok(order)
+        }
+    }
+}
+
 fn unclear([a, b]: [&Path; 2]) -> Error {
     let text = format!("{} or {} may come first: the numbers in their names can be read in two ways", name(a), name(b));
     Error::input(a, format!("{text}; list the files in their order"))

@@ -3,6 +3,7 @@
 use super::{by_name, has_header, links};
 use crate::format::{Format, Reader};
 use crate::shared::extension::extension;
+use crate::shared::links::{is_lost, lost};
 use crate::zarr::metadata_file;
 use crate::numbering::{self, Planes};
 use crate::{file_series, vtk, vtk_xml};
@@ -48,18 +49,6 @@ fn refuse_lost(paths: &[PathBuf]) -> Result<()> {
         Some(path) => Err(lost(path)),
         None => Ok(()),
     }
-}
-
-/// Whether a path is a link that leads nowhere.
-pub(crate) fn is_lost(path: &Path) -> bool {
-    path.is_symlink() && fs::metadata(path).is_err()
-}
-
-/// The error of such a link.
-pub(crate) fn lost(link: &Path) -> Error {
-    let to = fs::read_link(link).unwrap_or_default();
-    let gone = |e| Error::input(link, format!("is a link to {}, which cannot be opened: {e}", to.display()));
-    fs::metadata(link).map_or_else(gone, |_| Error::input(link, "is a link that leads nowhere"))
 }
 
 /// Whether the inputs are files with headers.
@@ -225,6 +214,7 @@ mod tests {
     use super::*;
     use crate::testing::{DIMS, Folder, check_inputs, payload, refused};
     use wavesplat_core::base::sample::SampleType;
+    use wavesplat_core::source::GivenTimes;
 
     const TY: SampleType = SampleType::U16;
 
@@ -289,6 +279,49 @@ mod tests {
         refused(&[folder.path("gone.npy")], &OpenOptions::default(), "gone.npy: opening");
         refused(&[folder.path("g*.raw")], &raw(), "no file matches");
         refused(&[folder.path("[")], &raw(), "no valid pattern");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_to_files_that_are_gone_are_named() {
+        let folder = Folder::new();
+        let files = frames(&folder, 0..3);
+        let link = folder.path("f3.raw");
+        std::os::unix::fs::symlink("/moved/away/f3.raw", &link).expect("a link");
+        let listed: Vec<PathBuf> = files.iter().chain([&link]).cloned().collect();
+        for inputs in [vec![folder.path("")], vec![folder.path("*.raw")], vec![folder.path("f?.raw")], listed] {
+            refused(&inputs, &raw(), "f3.raw: is a link to /moved/away/f3.raw, which cannot be opened");
+        }
+        let inner = Folder::new();
+        for t in 0..2 {
+            fs::create_dir(inner.path(&format!("r{t}"))).expect("a folder");
+            inner.write(&format!("r{t}/u.raw"), payload(TY, t..t + 1, false));
+        }
+        let pattern = [inner.path("r*/u.raw")];
+        check_inputs(&pattern, &raw(), TY, 2);
+        std::os::unix::fs::symlink("/moved/away", inner.path("r2")).expect("a link");
+        refused(&pattern, &raw(), "r2: is a link to /moved/away");
+        let list = folder.write("a.pvd", "<VTKFile type=\"Collection\"><DataSet timestep=\"7\" file=\"f3.raw\"/></VTKFile>");
+        refused(&[list], &OpenOptions::default(), "f3.raw: is a link to");
+    }
+
+    #[test]
+    fn files_of_planes_are_stacked() {
+        let folder = Folder::new();
+        let plane = DIMS[0] * DIMS[1] * 2;
+        for t in 0..3 {
+            for (z, bytes) in payload(TY, t..t + 1, false).chunks(plane).enumerate() {
+                folder.write(&format!("img_z{z}_t{}.raw", 5 * t), bytes);
+            }
+        }
+        let options = OpenOptions { dims: Some(vec![DIMS[0], DIMS[1], 1]), ..raw() };
+        check_inputs(&[folder.path("")], &options, TY, 3);
+        check_inputs(&[folder.path("*.raw")], &OpenOptions { spacing: Some([1.0, 2.0, 3.0]), ..options.clone() }, TY, 3);
+        let timed = OpenOptions { times: Some(GivenTimes::List(vec![0.0, 1.0, 4.0])), ..options.clone() };
+        let source = crate::open(&[folder.path("")], &timed).expect("times of frames");
+        assert_eq!(source.archive().times, [0.0, 1.0, 4.0]);
+        fs::remove_file(folder.path("img_z1_t5.raw")).expect("removing");
+        refused(&[folder.path("")], &options, "names count several things");
     }
 
     #[test]

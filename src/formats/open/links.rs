@@ -1,6 +1,6 @@
 //! Links to files that are gone, among the files that a pattern means.
 
-use super::inputs::is_lost;
+use crate::shared::links::is_lost;
 use glob::{MatchOptions, Pattern};
 use std::fs;
 use std::path::{Component, Path, PathBuf};

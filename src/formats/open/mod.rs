@@ -1,9 +1,11 @@
 //! Opens inputs: finds the files, recognises each format by its extension or first bytes, and reads the headers.
 
-pub(crate) mod inputs;
 mod links;
+pub(crate) mod inputs;
 mod magnitude;
 mod planes;
+#[cfg(test)]
+mod axes_tests;
 #[cfg(test)]
 mod series_tests;
 mod stream;
@@ -11,7 +13,7 @@ mod stream;
 use super::arrays::held::{self, NamedArrays};
 use super::format::{Choices, Format, Reader};
 use super::shared::extension::extension;
-use super::{FORMATS, nifti, npy, raw, zarr};
+use super::{FORMATS, nifti, npy, raw, tif, zarr};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -63,7 +65,16 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
 
 fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let inputs::Expanded { files, planes } = inputs::expand(inputs, options)?;
-    let open = |options: &OpenOptions| Series::open(&files, options, |path, extent| describe(path, options, extent));
+    let is_alone = files.paths.len() == 1;
+    let open = |options: &OpenOptions| {
+        Series::open(&files, options, |path, extent| {
+            let mut header = describe(path, options, extent)?;
+            if !is_alone && of_file(path).is_some_and(|format| format.is(&npy::FORMAT) || format.is(&tif::FORMAT)) {
+                header.notes.retain(|note| note.remedy != Some(Remedy::Set("axes"))); // a frame in each file
+            }
+            Ok(header)
+        })
+    };
     match planes {
         Some(planes) => planes::stacked(&files.paths[0], options, planes, open),
         None => Ok(Box::new(open(options)?)),
@@ -183,18 +194,17 @@ fn components(path: &Path, options: &OpenOptions) -> Vec<VariableInfo> {
 
 /// Refuses options that would be ignored, so that users do not think that they had an effect.
 fn refuse_options(path: &Path, format: &Format, options: &OpenOptions) -> Result<()> {
+    let is_named = options.variable.is_some() && !options.variable_is_remembered && options.axes.is_none();
     let given = [
         (options.dims.is_some(), "dims"),
         (options.sample.is_some(), "sample"),
         (options.big_endian, "big_endian"),
         (options.offset > 0, "offset"),
-        (options.variable.is_some() && format.is(&npy::FORMAT) && !options.variable_is_remembered, "variable"),
-        (options.axes.is_some() && !matches!(format.reader, Reader::Arrays(_)), "axes"),
+        (is_named && format.is(&npy::FORMAT), "variable"),
     ];
     let Some((_, setting)) = given.into_iter().find(|(given, _)| *given) else { return Ok(()) };
     let what = match setting {
         "variable" => "has a single array without a name; leave this out",
-        "axes" => "says itself what its axes count; this is for HDF5, NetCDF and Zarr",
         _ if format.holds_frames() => "says itself what it holds; this is for headerless data, leave it out",
         _ => return Ok(()),
     };

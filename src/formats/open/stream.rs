@@ -36,6 +36,9 @@ pub(crate) struct Stream<R> {
 impl<R: Read> Stream<R> {
     /// Reads the header before the first frame.
     pub(crate) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
+        if options.axes.is_some() {
+            return Err(Error::setting("axes", "is for files: a stream has frames z y x, one after another"));
+        }
         let mut head = Vec::new();
         let magic = MAGIC.len() as u64;
         reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(STANDARD, "reading", e))?;

@@ -122,6 +122,16 @@ impl Meaning {
         Layout(self.sizes.iter().enumerate().map(axis).rev().collect())
     }
 
+    /// The array with its voxels along the axes that the letters name, of which one component is meant.
+    pub(crate) fn plain_layout(&self, component: usize) -> Layout {
+        let axis = |(kind, len): (&Kind, &usize)| match kind {
+            Kind::Voxels(letter) => Axis::new(AxisRole::of_voxels(*letter), *len),
+            Kind::Frames => Axis::new(AxisRole::Frames, *len),
+            Kind::Components => Axis::single(if *len > 1 { component } else { 0 }, *len),
+        };
+        Layout(self.kinds.iter().zip(&self.sizes).map(axis).rev().collect())
+    }
+
     /// Where voxels are, by the step along each stored axis that is known. Letters that are not in the order of x, y, z go
     /// along the world's axes.
     pub(crate) fn directions(&self, step: impl Fn(usize) -> Option<[f64; 3]>, first: [f64; 3]) -> Directions {

@@ -7,6 +7,7 @@ mod read;
 mod write;
 
 use super::format::{Choices, Format, Reader};
+use super::shared::relabelled::relabelled;
 use super::writer::{Axes, OutputFiles, Writer};
 
 /// Image data: points on a lattice.
@@ -42,7 +43,10 @@ pub(crate) static PVD: Format = Format {
 };
 
 const READER: Reader = Reader::Frames(
-    Ok(|path, options, _| read::describe(path, options.variable.as_deref())),
+    Ok(|path, options, _| {
+        let header = read::describe(path, options.variable.as_deref())?;
+        relabelled(path, header, options.axes.as_deref())
+    }),
     Choices::Variables(read::undecided),
 );
 

@@ -2,6 +2,8 @@
 
 mod layout;
 #[cfg(feature = "zarr")]
+mod ome;
+#[cfg(feature = "zarr")]
 mod read;
 mod store;
 mod write;

@@ -1,13 +1,16 @@
 //! Zarr stores of versions 2 and 3 as [`ArrayFile`].
 
 use super::layout::{DIMENSIONS, metadata_file};
+use super::ome::{Coordinates, Multiscales, Resolutions};
 use crate::arrays::describe::numbers;
 use crate::arrays::opener::ReadConfig;
 use crate::arrays::{ArrayArchive, ArrayFile, Attribute, Attributes, Variable};
+use crate::shared::links::{is_lost, lost};
 use serde_json::Value;
+use std::fs;
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use wavesplat_core::base::description::{self, NumberType};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::stored::StoredType;
@@ -21,29 +24,86 @@ const MOST_DEPTH: usize = 16;
 /// Opens a folder and lists its arrays.
 pub(super) fn open(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
     let metadata = metadata_file(path).ok_or_else(|| Error::input(path, "is no Zarr store"))?;
-    ArrayArchive::open("Zarr", path, Some(&metadata), Arc::new(open_folder), options)
+    refuse_lost(path, 0)?;
+    let resolutions = if options.variable.is_some() { Resolutions::All } else { Resolutions::Finest };
+    let open = move |path: &Path, _: ReadConfig| open_folder(path, resolutions);
+    ArrayArchive::open("Zarr", path, Some(&metadata), Arc::new(open), options)
 }
 
-fn open_folder(path: &Path, _how: ReadConfig) -> Result<Box<dyn ArrayFile>> {
+/// An error if a store has a link to a file that is not there: its samples would be taken as never written.
+fn refuse_lost(folder: &Path, depth: usize) -> Result<()> {
+    let failed = |e| Error::io(folder, "listing", e);
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let kind = entry.file_type().map_err(failed)?;
+        if kind.is_symlink() && is_lost(&entry.path()) {
+            return Err(lost(&entry.path()));
+        }
+        let is_folder = kind.is_dir() || kind.is_symlink() && entry.path().is_dir();
+        if is_folder && depth < MOST_DEPTH {
+            refuse_lost(&entry.path(), depth + 1)?;
+        }
+    }
+    Ok(())
+}
+
+fn open_folder(path: &Path, resolutions: Resolutions) -> Result<Box<dyn ArrayFile>> {
     let store = FilesystemStore::new(path);
-    Ok(Box::new(ZarrArrayFile(Arc::new(store.map_err(|e| Error::input(path, format!("is no Zarr store: {e}")))?))))
+    let store = Arc::new(store.map_err(|e| Error::input(path, format!("is no Zarr store: {e}")))?);
+    Ok(Box::new(ZarrArrayFile { store, resolutions, listed: OnceLock::new() }))
 }
 
-struct ZarrArrayFile(Arc<FilesystemStore>);
+struct ZarrArrayFile {
+    store: Arc<FilesystemStore>,
+    resolutions: Resolutions,
+    /// All arrays, and the coordinates that OME-Zarr says in its attributes.
+    listed: OnceLock<Parsed<(Vec<Variable>, Coordinates)>>,
+}
+
+impl ZarrArrayFile {
+    fn list(&self) -> Parsed<(Vec<Variable>, Coordinates)> {
+        let (mut all, mut coordinates) = (Vec::new(), Coordinates::new());
+        if let Ok(array) = Array::open(self.store.clone(), "/") {
+            return Ok((vec![variable(&array)], coordinates));
+        }
+        let root = Group::open(self.store.clone(), "/").map_err(|e| format!("is no Zarr store that can be read: {e}"))?;
+        let mut images = Vec::new();
+        add(&root, 0, &mut all, &mut images)?;
+        for image in &images {
+            image.apply(self.resolutions, &mut all, &mut coordinates);
+        }
+        Ok((all, coordinates))
+    }
+
+    /// The attributes of coordinates that no array has.
+    fn described_coordinate(&self, path: &str) -> Vec<description::Attribute> {
+        let listed = self.listed().ok().and_then(|(all, _)| all.iter().find(|array| array.path == path));
+        let text = |(name, value): (&String, &Attribute)| match value {
+            Attribute::Text(text) => {
+                Some(description::Attribute { name: name.clone(), value: description::Values::text(text) })
+            }
+            Attribute::Texts(_) | Attribute::Numbers(_) => None,
+        };
+        listed.map(|array| array.attributes.iter().filter_map(text).collect()).unwrap_or_default()
+    }
+
+    fn listed(&self) -> Parsed<&(Vec<Variable>, Coordinates)> {
+        self.listed.get_or_init(|| self.list()).as_ref().map_err(Clone::clone)
+    }
+
+    /// The coordinates of this path that no array has.
+    fn coordinate(&self, path: &str) -> Option<&[f64]> {
+        self.listed().ok()?.1.get(path).map(Vec::as_slice)
+    }
+}
 
 impl ArrayFile for ZarrArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
-        if let Ok(array) = Array::open(self.0.clone(), "/") {
-            return Ok(vec![variable(&array)]);
-        }
-        let root = Group::open(self.0.clone(), "/").map_err(|e| format!("is no Zarr store that can be read: {e}"))?;
-        let mut all = Vec::new();
-        add(&root, 0, &mut all)?;
-        Ok(all)
+        Ok(self.listed()?.0.clone())
     }
 
     fn read(&self, path: &str, ty: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
-        let array = Array::open(self.0.clone(), path).map_err(|e| e.to_string())?;
+        let array = Array::open(self.store.clone(), path).map_err(|e| e.to_string())?;
         let ranges: Vec<_> = ranges.iter().map(|r| r.start as u64..r.end as u64).collect();
         bytes(&array, ty, &ArraySubset::new_with_ranges(&ranges))
     }
@@ -53,23 +113,30 @@ impl ArrayFile for ZarrArrayFile {
             Some(description::Attribute { name: name.clone(), value: described(value)? })
         };
         match path {
-            "" => Group::open(self.0.clone(), "/")
+            "" => Group::open(self.store.clone(), "/")
                 .map(|group| group.attributes().iter().filter_map(one).collect())
                 .unwrap_or_default(),
-            path => Array::open(self.0.clone(), path)
+            path if self.coordinate(path).is_some() => self.described_coordinate(path),
+            path => Array::open(self.store.clone(), path)
                 .map(|array| array.attributes().iter().filter_map(one).collect())
                 .unwrap_or_default(),
         }
     }
 
     fn values(&self, path: &str) -> Parsed<description::Values> {
-        let array = Array::open(self.0.clone(), path).map_err(|e| e.to_string())?;
+        if let Some(values) = self.coordinate(path) {
+            return Ok(description::Values::floats(values));
+        }
+        let array = Array::open(self.store.clone(), path).map_err(|e| e.to_string())?;
         let (number, stored) = (number_type(array.data_type())?, stored_type(array.data_type())?);
         Ok(numbers(number, &bytes(&array, stored, &array.subset_all())?))
     }
 
     fn number_type(&self, path: &str) -> Parsed<NumberType> {
-        number_type(Array::open(self.0.clone(), path).map_err(|e| e.to_string())?.data_type())
+        if self.coordinate(path).is_some() {
+            return Ok(NumberType::F64);
+        }
+        number_type(Array::open(self.store.clone(), path).map_err(|e| e.to_string())?.data_type())
     }
 }
 
@@ -107,16 +174,22 @@ fn number_type(ty: &DataType) -> Parsed<NumberType> {
     stored_type(ty)?.number().ok_or_else(|| ty.to_string())
 }
 
-fn add(group: &Group<FilesystemStore>, depth: usize, all: &mut Vec<Variable>) -> Parsed<()> {
+fn add(
+    group: &Group<FilesystemStore>,
+    depth: usize,
+    all: &mut Vec<Variable>,
+    images: &mut Vec<Multiscales>,
+) -> Parsed<()> {
     if depth > MOST_DEPTH {
         return Ok(());
     }
+    images.extend(Multiscales::read(group.path().as_str(), group.attributes())?);
     for node in group.child_paths().map_err(|e| e.to_string())? {
         let store = group.storage();
         match Array::open(store.clone(), node.as_str()) {
             Ok(array) => all.push(variable(&array)),
             Err(e) => match Group::open(store, node.as_str()) {
-                Ok(group) => add(&group, depth + 1, all)?,
+                Ok(group) => add(&group, depth + 1, all, images)?,
                 Err(_) => all.push(unread(node.as_str(), e.to_string())),
             },
         }
