@@ -211,8 +211,8 @@ fn what_is_not_supported_is_named() {
     with("dimension: 4", "dimension: 6", "6 dimension(s)");
     with(
         "dimension: 4\nsizes: 7 5 3 4",
-        "dimension: 3\nsizes: 7 5 12\nkinds: domain domain time",
-        "2 of space, 1 of frames",
+        "dimension: 3\nsizes: 7 5 12\nkinds: domain list time",
+        "1 of space, 2 of frames",
     );
     with("dimension: 4\nsizes: 7 5 3 4", "dimension: 5\nsizes: 7 5 3 4 1", "axes 4 of space, 1 of frames");
     with("# a comment", "kinds: 2-vector domain domain domain", "ChooseComponent { name: \"samples\", components: 7 }");

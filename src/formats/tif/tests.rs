@@ -139,3 +139,103 @@ fn no_damage_panics() {
         survives_damage("a.tif", &file::<Gray8>(&pages, "ImageJ=1\nslices=2\n", compression, |v| v as u8));
     }
 }
+
+/// The planes of all frames, the slowest axis first, with their frames first or last.
+fn pages_of(frames: usize, are_frames_first: bool) -> Vec<Vec<f64>> {
+    let pages = planes(SampleType::F32, 0..frames);
+    let place = |at: usize| if are_frames_first { at } else { 3 * (at % frames) + at / frames };
+    (0..pages.len()).map(|at| pages[place(at)].clone()).collect()
+}
+
+#[test]
+fn tifffile_says_the_axes_of_its_shape() {
+    let folder = Folder::new();
+    let (t_first, z_first) = (pages_of(4, true), pages_of(4, false));
+    for (pages, text) in [
+        (&t_first, r#"{"shape": [4, 3, 5, 7], "axes": "TZYX"}"#),
+        (&z_first, r#"{"shape": [3, 4, 5, 7], "axes": "ZTYX", "spacing": 2}"#),
+        (&t_first, r#"{"shape": [4, 1, 3, 5, 7], "axes": "TCZYX"}"#),
+        (&t_first, r#"{"shape": [4, 3, 5, 7], "axes": "QZYX"}"#),
+        (&t_first, r#"{"shape": [4, 3, 5, 7]}"#),
+        (&t_first, "shape=(4, 3, 5, 7)"),
+    ] {
+        let file = one(&folder, floats(pages, text));
+        check_inputs(&file, &OpenOptions::default(), SampleType::F32, 4);
+        let is_said = text.contains("TZ") || text.contains("ZT") || text.contains("TC");
+        let source = crate::open(&file, &OpenOptions::default()).expect("a header");
+        assert_eq!(source.archive().notes.is_empty(), is_said, "{text}");
+    }
+    let lapse = one(&folder, floats(&t_first, r#"{"shape": [12, 5, 7], "axes": "TYX"}"#));
+    let source = crate::open(&lapse, &OpenOptions::default()).expect("a header");
+    assert_eq!((source.archive().grid.dims, source.archive().frames), ([7, 5, 1], Some(12)));
+    let with = |text: &str, words: &str| refused(&one(&folder, floats(&t_first, text)), &OpenOptions::default(), words);
+    with(r#"{"shape": [4, 4, 5, 7], "axes": "TZYX"}"#, "has 12 page(s) of 5x7 pixels, but says the shape [4, 4, 5, 7]");
+    with(r#"{"shape": [2, 2, 3, 5, 7]}"#, "does not say what the axes");
+    with(r#"{"shape": [4, 3, 5, 7], "axes": "TZY"}"#, "but the axes TZY");
+    with(r#"{"shape": "#, "has a shape in its description");
+}
+
+#[test]
+fn the_users_letters_say_what_pages_count() {
+    let folder = Folder::new();
+    let lettered = |axes: &str| OpenOptions { axes: Some(axes.into()), ..OpenOptions::default() };
+    let z_first = pages_of(4, false);
+    let shaped = one(&folder, floats(&z_first, r#"{"shape": [3, 4, 5, 7], "axes": "TZYX"}"#));
+    check_inputs(&shaped, &lettered("ztyx"), SampleType::F32, 4);
+    let imagej = one(&folder, floats(&z_first, "ImageJ=1.54f\nimages=12\nslices=4\nframes=3\n"));
+    check_inputs(&imagej, &lettered("ztyx"), SampleType::F32, 4);
+    let plain = one(&folder, floats(&z_first, ""));
+    for (letters, dims, frames) in [("tyx", [7, 5, 1], 12), ("zyx", [7, 5, 12], 1), ("txy", [5, 7, 1], 12)] {
+        let source = crate::open(&plain, &lettered(letters)).expect("letters");
+        assert_eq!((source.archive().grid.dims, source.archive().frames), (dims, Some(frames)));
+    }
+    let source = crate::open(&plain, &OpenOptions::default()).expect("a guess");
+    assert!(source.archive().notes[0].text.contains("[12, 5, 7] are taken as zyx"));
+    refused(&plain, &lettered("tzyx"), "Set(\"axes\")");
+    refused(&plain, &lettered("yxt"), "which are not the last of the axes");
+}
+
+#[test]
+fn images_behind_each_other_on_one_page_are_read() {
+    let folder = Folder::new();
+    let all = planes(SampleType::F32, 0..4);
+    let first = floats(&all[..1], "ImageJ=1.54f\nimages=12\nslices=3\nframes=4\n");
+    // Samples come before the directory of the page here: the rest goes behind them, and the offsets of the directory stay.
+    let start = first.windows(4).position(|bytes| bytes == (all[0][0] as f32).to_le_bytes()).expect("the first sample");
+    let bytes: Vec<u8> = all.iter().flatten().flat_map(|v| (*v as f32).to_le_bytes()).collect();
+    let mut file = first.clone();
+    let moved = file.len();
+    file.extend(&bytes);
+    let patched = moved_strips(file, start, moved);
+    check_inputs(&one(&folder, patched.clone()), &OpenOptions::default(), SampleType::F32, 4);
+    let short = patched[..patched.len() - 1].to_vec();
+    refused(&one(&folder, short), &OpenOptions::default(), "has one page of the images that it says, and 1679 bytes");
+    let packed = file_of_one_page(&all[..1]);
+    refused(&one(&folder, packed), &OpenOptions::default(), "compressed or in pieces");
+}
+
+fn file_of_one_page(pages: &[Vec<f64>]) -> Vec<u8> {
+    file::<Gray32Float>(pages, "ImageJ=1\nimages=12\nslices=3\nframes=4\n", LZW, |v| v as f32)
+}
+
+/// The file with its strips at another place: every offset of a strip is found by its value.
+fn moved_strips(mut file: Vec<u8>, from: usize, to: usize) -> Vec<u8> {
+    let row = 2 * DIMS[0] * 4;
+    for strip in 0..DIMS[1].div_ceil(2) {
+        let [old, new] = [from, to].map(|start| ((start + strip * row) as u32).to_le_bytes());
+        let at = (0..to).rev().find(|at| file[*at..].starts_with(&old)).expect("an offset");
+        file[at..at + 4].copy_from_slice(&new);
+    }
+    file
+}
+
+#[test]
+fn samples_of_which_0_is_white_are_as_they_are_stored() {
+    let folder = Folder::new();
+    let mut bytes = file::<Gray8>(&planes(SampleType::U8, 0..1), "", Compression::Uncompressed, |v| v as u8);
+    let black = [6, 1, 3, 0, 1, 0, 0, 0, 1, 0]; // PhotometricInterpretation = 1
+    let at: Vec<usize> = (0..bytes.len() - 10).filter(|at| bytes[*at..].starts_with(&black)).collect();
+    assert_eq!(at.len(), 3, "one for each page");
+    at.into_iter().for_each(|at| bytes[at + 8] = 0);
+    check_inputs(&one(&folder, bytes), &OpenOptions::default(), SampleType::U8, 1);
+}
