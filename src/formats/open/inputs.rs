@@ -317,7 +317,7 @@ mod tests {
         let options = OpenOptions { dims: Some(vec![DIMS[0], DIMS[1], 1]), ..raw() };
         check_inputs(&[folder.path("")], &options, TY, 3);
         check_inputs(&[folder.path("*.raw")], &OpenOptions { spacing: Some([1.0, 2.0, 3.0]), ..options.clone() }, TY, 3);
-        let timed = OpenOptions { times: Some(GivenTimes::List(vec![0.0, 1.0, 4.0])), ..options.clone() };
+        let timed = OpenOptions { times: Some(GivenTimes::List(vec![0.0, 1.0, 4.0].into())), ..options.clone() };
         let source = crate::open(&[folder.path("")], &timed).expect("times of frames");
         assert_eq!(source.archive().times, [0.0, 1.0, 4.0]);
         fs::remove_file(folder.path("img_z1_t5.raw")).expect("removing");
