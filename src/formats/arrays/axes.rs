@@ -43,8 +43,9 @@ impl TimeHint {
     }
 
     /// Takes the axis as that of frames, unless it or another is known already. Says so if that is not the usual order.
-    fn apply(self, known: &mut [Option<AxisRole>]) -> Option<Note> {
-        if known.contains(&Some(AxisRole::Frames)) || known[self.axis].is_some() {
+    fn apply(self, variable: &Variable, known: &mut [Option<AxisRole>]) -> Option<Note> {
+        let is_taken = known[self.axis].is_some() || is_beside(&variable.dims[self.axis]);
+        if known.contains(&Some(AxisRole::Frames)) || is_taken {
             return None;
         }
         known[self.axis] = Some(AxisRole::Frames);
@@ -64,7 +65,7 @@ pub(crate) fn axes(
 ) -> Advised<(Vec<Axis>, Vec<Note>)> {
     let Some(letters) = letters else {
         let mut known = known(variable, all);
-        let hinted = hint.filter(|_| variable.lengths.len() > 3).and_then(|hint| hint.apply(&mut known));
+        let hinted = hint.filter(|_| variable.lengths.len() > 3).and_then(|hint| hint.apply(variable, &mut known));
         let axes = complete(variable, by_order(variable, known.clone(), index.is_some()), index)?;
         let guessed = note(variable, &known, &axes);
         return Ok((axes, hinted.into_iter().chain(guessed).collect()));
@@ -186,13 +187,17 @@ fn component_axis(variable: &Variable, free: &[usize], is_timed: bool) -> usize 
 /// Names of axes along which an archive is not continued.
 const BESIDE: [&str; 8] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band"];
 
+fn is_beside(dim: &str) -> bool {
+    BESIDE.contains(&dim.to_lowercase().as_str())
+}
+
 /// Assigns the remaining roles to the unknown axes, in the usual order t z y x. With an index, or if there are too many, the
 /// axis that probably counts components gets none.
 fn by_order(variable: &Variable, mut found: Vec<Option<AxisRole>>, indexed: bool) -> Vec<Option<AxisRole>> {
-    let beside = |axis: &usize| BESIDE.contains(&variable.dims[*axis].to_lowercase().as_str());
-    let mut free: Vec<usize> = (0..found.len()).filter(|axis| found[*axis].is_none() && !beside(axis)).collect();
+    let is_free = |axis: &usize| found[*axis].is_none() && !is_beside(&variable.dims[*axis]);
+    let mut free: Vec<usize> = (0..found.len()).filter(is_free).collect();
     let mut roles: Vec<AxisRole> = ORDER.into_iter().filter(|role| !found.contains(&Some(*role))).collect();
-    if indexed && found.len() - free.len() == found.iter().flatten().count() {
+    if indexed && !free.is_empty() && found.len() - free.len() == found.iter().flatten().count() {
         free.remove(component_axis(variable, &free, found.contains(&Some(AxisRole::Frames))));
     }
     while free.len() > roles.len()
@@ -255,5 +260,20 @@ mod tests {
             assert_eq!(found(no_hint, &[]), (Some(0), 1), "{no_hint:?}");
         }
         assert_eq!(found(Some(&[128, 128, 128, 1]), &[0, 3]), (Some(3), 2));
+    }
+
+    #[test]
+    fn axes_beside_space_and_time_are_never_frames() {
+        for name in ["channel", "member"] {
+            let dims = [name, "z", "y", "x"].map(String::from).to_vec();
+            let variable = Variable { dims, ..variable(&[4, 5, 6, 7], Some(&[1, 5, 6, 7])) };
+            let hint = TimeHint::from_storage(&variable, &[]);
+            assert!(axes(&variable, &[], None, None, hint).is_err_and(|note| note.remedy.is_some()), "{name}");
+            let (found, _) = axes(&variable, &[], Some(2), None, hint).expect("an index");
+            assert_eq!(found[0], Axis::single(2, 4));
+        }
+        let dims = ["time", "z", "y", "x"].map(String::from).to_vec();
+        let variable = Variable { dims, ..variable(&[4, 5, 6, 7], None) };
+        assert!(axes(&variable, &[], Some(1), None, None).is_err_and(|note| note.text.contains("no axis beside")));
     }
 }

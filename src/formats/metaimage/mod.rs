@@ -15,10 +15,7 @@ pub(crate) static FORMAT: Format = Format {
     name: layout::NAME,
     extensions: &["mha", "mhd"],
     starts: &[],
-    reader: Reader::Frames(
-        Ok(|path, options, _| read::describe(path, options)),
-        Choices::Components,
-    ),
+    reader: Reader::Frames(Ok(|path, options, _| read::describe(path, options)), Choices::Components),
     writers: &[Writer {
         name: "mha",
         place: 9,

@@ -18,10 +18,7 @@ pub(crate) static FORMAT: Format = Format {
     name: "NIfTI",
     extensions: &["nii", "nii.gz", "hdr", "hdr.gz"],
     starts: &[], // the length of the header, in either byte order
-    reader: Reader::Frames(
-        Ok(|path, options, _| read::describe(path, options)),
-        Choices::Components,
-    ),
+    reader: Reader::Frames(Ok(|path, options, _| read::describe(path, options)), Choices::Components),
     writers: &[PLAIN, Writer { name: "nii.gz", place: 8, gzip: true, ..PLAIN }],
 };
 

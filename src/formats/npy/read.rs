@@ -1,19 +1,19 @@
 //! Reads NumPy's `.npy`.
 
+use crate::shared::meaning::{Kind, Meaning};
 use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
-use crate::shared::meaning::{Kind, Meaning};
 use wavesplat_core::base::description::AxisRole;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::npy::{Header, MAGIC};
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::base::stored::StoredType;
-use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 use wavesplat_core::source::file_header::{FileHeader, check_size};
 use wavesplat_core::source::layout::{Layout, Shape};
 use wavesplat_core::source::parts::{DataLocation, Part, Stored};
+use wavesplat_core::source::{Advised, OpenOptions, Parsed};
 
 const MAX_HEADER: usize = 1 << 20; // bytes; NumPy itself stops at 10,000
 

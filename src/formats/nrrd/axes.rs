@@ -5,8 +5,8 @@ use crate::shared::directions::Directions;
 use crate::shared::meaning::{Kind, Meaning};
 use crate::shared::sequence::SequenceTimes;
 use crate::shared::words::{list, numbers};
-use wavesplat_core::source::{Advised, Parsed};
 use wavesplat_core::source::file_header::Units;
+use wavesplat_core::source::{Advised, Parsed};
 
 /// The axes of an array, numbered from the fastest as in the file.
 #[derive(Debug)]

@@ -18,10 +18,7 @@ pub(crate) static FORMAT: Format = Format {
     name: layout::NAME,
     extensions: &["nrrd", "nhdr"],
     starts: &[layout::MAGIC],
-    reader: Reader::Frames(
-        Ok(|path, options, _| read::describe(path, options)),
-        Choices::Components,
-    ),
+    reader: Reader::Frames(Ok(|path, options, _| read::describe(path, options)), Choices::Components),
     writers: &[
         Writer {
             name: "nrrd",

@@ -97,7 +97,8 @@ impl<'a> Spelled<'a> {
     /// The number whose first digit is here. A sign before it is taken off the words.
     fn at(text: &'a [u8], start: usize, style: Style, words: &mut Vec<u8>) -> Self {
         let digits = digits(text, start);
-        let mut spelled = Self { is_negative: false, digits, fraction: &[], exponent: &[], start, end: start + digits.len() };
+        let mut spelled =
+            Self { is_negative: false, digits, fraction: &[], exponent: &[], start, end: start + digits.len() };
         if style == Style::Integers {
             return spelled;
         }

@@ -44,11 +44,15 @@ fn integers_after_points_and_hyphens_are_integers() {
 
 #[test]
 fn several_numbers_of_one_time_are_in_order() {
-    let dates: Vec<String> =
-        (2016..2018).flat_map(|y| (1..=12).map(move |m| format!("{y}-{m:02}"))).collect();
+    let dates: Vec<String> = (2016..2018).flat_map(|y| (1..=12).map(move |m| format!("{y}-{m:02}"))).collect();
     sorted(&dates.iter().map(String::as_str).collect::<Vec<_>>());
     sorted(&["w_20160131_00", "w_20160131_12", "w_20160201_00", "w_20160201_12"]);
-    sorted(&["wrf_2005-08-28_00:00:00", "wrf_2005-08-28_12:00:00", "wrf_2005-08-29_00:00:00", "wrf_2005-08-29_12:00:00"]);
+    sorted(&[
+        "wrf_2005-08-28_00:00:00",
+        "wrf_2005-08-28_12:00:00",
+        "wrf_2005-08-29_00:00:00",
+        "wrf_2005-08-29_12:00:00",
+    ]);
     sorted(&["step_0_t_0.0", "step_10_t_0.5", "step_20_t_1.5"]);
     sorted(&["f0_scan9", "f1_scan3", "f2_scan7"]);
 }

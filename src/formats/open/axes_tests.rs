@@ -115,7 +115,11 @@ fn letters_make_components_frames() {
     let nrrd = folder.write("a.nrrd", nrrd("4 7 5 3", kinds, &bytes));
     for file in [meta, nrrd] {
         check_inputs(std::slice::from_ref(&file), &lettered("zyxt"), TY, FRAMES);
-        refused(std::slice::from_ref(&file), &OpenOptions::default(), "4 components (if these are frames, the axes are zyxt)");
+        refused(
+            std::slice::from_ref(&file),
+            &OpenOptions::default(),
+            "4 components (if these are frames, the axes are zyxt)",
+        );
     }
     let file = folder.write("a.nii", nifti(&[7, 5, 3, 1, 4], &stored("tzyx")));
     check_inputs(std::slice::from_ref(&file), &lettered("tczyx"), TY, FRAMES);

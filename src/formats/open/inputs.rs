@@ -2,10 +2,10 @@
 
 use super::{by_name, has_header, links};
 use crate::format::{Format, Reader};
+use crate::numbering::{self, Planes};
 use crate::shared::extension::extension;
 use crate::shared::links::{is_lost, lost};
 use crate::zarr::metadata_file;
-use crate::numbering::{self, Planes};
 use crate::{file_series, vtk, vtk_xml};
 use std::collections::HashSet;
 use std::fs;
@@ -301,7 +301,8 @@ mod tests {
         check_inputs(&pattern, &raw(), TY, 2);
         std::os::unix::fs::symlink("/moved/away", inner.path("r2")).expect("a link");
         refused(&pattern, &raw(), "r2: is a link to /moved/away");
-        let list = folder.write("a.pvd", "<VTKFile type=\"Collection\"><DataSet timestep=\"7\" file=\"f3.raw\"/></VTKFile>");
+        let list =
+            folder.write("a.pvd", "<VTKFile type=\"Collection\"><DataSet timestep=\"7\" file=\"f3.raw\"/></VTKFile>");
         refused(&[list], &OpenOptions::default(), "f3.raw: is a link to");
     }
 
@@ -316,7 +317,12 @@ mod tests {
         }
         let options = OpenOptions { dims: Some(vec![DIMS[0], DIMS[1], 1]), ..raw() };
         check_inputs(&[folder.path("")], &options, TY, 3);
-        check_inputs(&[folder.path("*.raw")], &OpenOptions { spacing: Some([1.0, 2.0, 3.0]), ..options.clone() }, TY, 3);
+        check_inputs(
+            &[folder.path("*.raw")],
+            &OpenOptions { spacing: Some([1.0, 2.0, 3.0]), ..options.clone() },
+            TY,
+            3,
+        );
         let timed = OpenOptions { times: Some(GivenTimes::List(vec![0.0, 1.0, 4.0].into())), ..options.clone() };
         let source = crate::open(&[folder.path("")], &timed).expect("times of frames");
         assert_eq!(source.archive().times, [0.0, 1.0, 4.0]);

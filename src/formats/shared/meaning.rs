@@ -216,7 +216,8 @@ mod tests {
     fn missing_steps_are_at_right_angles() {
         let planes = Meaning::by_letters(&[8, 9, 4], "tyx").expect("planes");
         let turned = [[0.0, 0.0, 2.0], [3.0, 0.0, 0.0]];
-        let placed = planes.directions(|axis| turned.get(axis).copied(), [0.0; 3]).placed(planes.lengths(), "directions");
+        let placed =
+            planes.directions(|axis| turned.get(axis).copied(), [0.0; 3]).placed(planes.lengths(), "directions");
         assert_eq!((placed.axes, placed.spacing), ([(2, false), (0, false), (1, false)], [3.0, 1.0, 2.0]));
         let row = Meaning::by_letters(&[8, 4], "tx").expect("rows");
         let placed = row.directions(|_| Some([2.0, 0.0, 0.0]), [0.0; 3]).placed(row.lengths(), "directions");

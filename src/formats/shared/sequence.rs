@@ -25,7 +25,8 @@ impl SequenceTimes {
         }
         let split = |text: &str| text.split([' ', ',', '\t']).filter(|word| !word.is_empty()).map(number).collect();
         let list = |text: &str| -> Option<Vec<f64>> { split(text) };
-        let values = get(&format!("axis {axis} index values")).map(|text| (text, get(&format!("axis {axis} index unit"))));
+        let values =
+            get(&format!("axis {axis} index values")).map(|text| (text, get(&format!("axis {axis} index unit"))));
         let labels = || Some((get("MultiVolume.FrameLabels")?, get("MultiVolume.FrameIdentifyingDICOMTagUnits")));
         let (text, unit) = values.or_else(labels)?;
         let times = list(text).filter(|times| times.len() == count)?;

@@ -129,7 +129,8 @@ impl Pages {
             Some(start) if start.checked_add(bytes).is_some_and(|end| end <= len) => Ok(start),
             Some(start) => {
                 let found = len.saturating_sub(start);
-                let what = format!("has one page of the images that it says, and {found} bytes of samples, not {bytes}");
+                let what =
+                    format!("has one page of the images that it says, and {found} bytes of samples, not {bytes}");
                 Err(Error::input(&self.path, what))
             }
             None => {

@@ -144,7 +144,8 @@ pub(super) fn guessed(mut axes: Vec<Counts>) -> Advised<(Vec<Counts>, Option<Not
     if unknown.is_empty() {
         return Ok((axes, None));
     }
-    let letters: String = axes.iter().map(|axis| if axis.letter == '?' { 'c' } else { axis.letter.to_ascii_lowercase() }).collect();
+    let letters: String =
+        axes.iter().map(|axis| if axis.letter == '?' { 'c' } else { axis.letter.to_ascii_lowercase() }).collect();
     let text = format!("the axes {lengths:?} are taken as {letters}, slowest first");
     Ok((axes, Some(Note::with(text, Remedy::Set("axes")))))
 }

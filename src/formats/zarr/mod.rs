@@ -6,6 +6,8 @@ mod ome;
 #[cfg(feature = "zarr")]
 mod read;
 mod store;
+#[cfg(all(test, feature = "zarr"))]
+mod tests;
 mod write;
 
 pub(crate) use layout::metadata_file;

@@ -19,16 +19,16 @@ pub(super) enum Resolutions {
     Finest,
 }
 
-/// Units of length as they are called here, and in metres.
-const LENGTHS: [(&str, &str, f64); 8] = [
-    ("micrometer", "um", 1e-6),
-    ("nanometer", "nm", 1e-9),
-    ("angstrom", "angstrom", 1e-10),
-    ("millimeter", "mm", 1e-3),
-    ("centimeter", "cm", 1e-2),
-    ("meter", "m", 1.0),
-    ("kilometer", "km", 1e3),
-    ("picometer", "pm", 1e-12),
+/// Units of length as they are called here, and as powers of ten in metres.
+const LENGTHS: [(&str, &str, i32); 8] = [
+    ("micrometer", "um", -6),
+    ("nanometer", "nm", -9),
+    ("angstrom", "angstrom", -10),
+    ("millimeter", "mm", -3),
+    ("centimeter", "cm", -2),
+    ("meter", "m", 0),
+    ("kilometer", "km", 3),
+    ("picometer", "pm", -12),
 ];
 
 /// Units of time as they are called here.
@@ -172,13 +172,16 @@ impl Image {
         let named = |name: &str| OmeAxis { name: name.into(), kind: kind_of(name).into(), unit: String::new() };
         let axes: Vec<OmeAxis> = match &self.axes {
             None => FIRST_AXES.into_iter().map(named).collect(),
-            Some(axes) => axes.iter().map(|axis| match axis {
-                SaidAxis::Name(name) => named(name),
-                SaidAxis::Full { name, kind, unit } => {
-                    let kind = kind.clone().unwrap_or_else(|| kind_of(name).into());
-                    OmeAxis { name: name.clone(), kind, unit: unit.clone().unwrap_or_default() }
-                }
-            }).collect(),
+            Some(axes) => axes
+                .iter()
+                .map(|axis| match axis {
+                    SaidAxis::Name(name) => named(name),
+                    SaidAxis::Full { name, kind, unit } => {
+                        let kind = kind.clone().unwrap_or_else(|| kind_of(name).into());
+                        OmeAxis { name: name.clone(), kind, unit: unit.clone().unwrap_or_default() }
+                    }
+                })
+                .collect(),
         };
         Some(axes).filter(|axes| axes.len() == count)
     }
@@ -225,14 +228,18 @@ fn take_lengths(axes: &[OmeAxis], lines: &mut [Line]) -> String {
     let known = |axis: &OmeAxis| LENGTHS.iter().find(|(said, ..)| *said == axis.unit);
     let space: Vec<usize> = (0..axes.len()).filter(|at| axes[*at].kind == "space").collect();
     let Some(last) = space.last() else { return String::new() };
-    let Some((_, called, metres)) = known(&axes[*last]) else {
+    let Some((_, called, power)) = known(&axes[*last]) else {
         let is_same = space.iter().all(|at| axes[*at].unit == axes[*last].unit);
         return if is_same { axes[*last].unit.clone() } else { String::new() };
     };
-    let factors: Option<Vec<f64>> = space.iter().map(|at| known(&axes[*at]).map(|(_, _, own)| own / metres)).collect();
-    let Some(factors) = factors else { return String::new() };
-    for (at, factor) in space.into_iter().zip(factors).filter(|(_, factor)| *factor != 1.0) {
-        lines[at] = Line { first: lines[at].first * factor, step: lines[at].step * factor };
+    let powers: Option<Vec<i32>> = space.iter().map(|at| known(&axes[*at]).map(|(_, _, own)| own - power)).collect();
+    let Some(powers) = powers else { return String::new() };
+    for (at, power) in space.into_iter().zip(powers) {
+        let scaled = |length: f64| match power {
+            0.. => length * 10_f64.powi(power),
+            power => length / 10_f64.powi(-power),
+        };
+        lines[at] = Line { first: scaled(lines[at].first), step: scaled(lines[at].step) };
     }
     (*called).into()
 }

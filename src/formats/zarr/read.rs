@@ -66,7 +66,8 @@ impl ZarrArrayFile {
         if let Ok(array) = Array::open(self.store.clone(), "/") {
             return Ok((vec![variable(&array)], coordinates));
         }
-        let root = Group::open(self.store.clone(), "/").map_err(|e| format!("is no Zarr store that can be read: {e}"))?;
+        let root =
+            Group::open(self.store.clone(), "/").map_err(|e| format!("is no Zarr store that can be read: {e}"))?;
         let mut images = Vec::new();
         add(&root, 0, &mut all, &mut images)?;
         for image in &images {
