@@ -22,7 +22,7 @@ pub(crate) fn check(paths: &[PathBuf]) -> Result<()> {
     }
     let (numbers, is_one) = match found(paths) {
         Found::One { numbers, is_alone } => (numbers, is_alone),
-        Found::Several(several) => return Err(several.refused(paths, Some(Remedy::AllowGaps))),
+        Found::Several(several) => return Err(several.refused(paths)),
         Found::Nothing | Found::Unclear { .. } => return Ok(()),
     };
     let steps: Vec<i128> = numbers.values.windows(2).map(|n| n[1] - n[0]).collect();

@@ -4,7 +4,7 @@ use super::names::{Column, Reading, Style};
 use super::{dates, name};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::error::{Error, Result};
 
 /// What the numbers in names say.
 pub(super) enum Found {
@@ -46,7 +46,7 @@ pub(crate) fn sort(paths: &mut Vec<PathBuf>) -> Result<Option<Planes>> {
         Found::One { numbers, .. } => (numbers.order(), None),
         Found::Several(several) => match several.planes() {
             Some((order, planes)) => (order, Some(planes)),
-            None => return Err(several.refused(paths, None)),
+            None => return Err(several.refused(paths)),
         },
         Found::Unclear { at } => return Err(unclear(at.map(|at| paths[at].as_path()))),
     };
@@ -61,7 +61,7 @@ pub(crate) fn sort(paths: &mut Vec<PathBuf>) -> Result<Option<Planes>> {
 pub(crate) fn order(names: &[PathBuf]) -> Result<Vec<usize>> {
     match found(names) {
         Found::One { numbers, .. } => Ok(numbers.order()),
-        Found::Several(several) => Err(several.refused(names, None)),
+        Found::Several(several) => Err(several.refused(names)),
         Found::Unclear { at } => Err(unclear(at.map(|at| names[at].as_path()))),
         Found::Nothing => {
             let mut order: Vec<usize> = (0..names.len()).collect();
@@ -193,7 +193,7 @@ impl Several {
     }
 
     /// The error that the names count several things.
-    pub(super) fn refused(&self, paths: &[PathBuf], remedy: Option<Remedy>) -> Error {
+    pub(super) fn refused(&self, paths: &[PathBuf]) -> Error {
         let count = |(at, column): (&usize, &Column)| {
             let label = self.reading.label(*at);
             let after = if label.is_empty() { String::new() } else { format!(" after {label:?}") };
@@ -202,8 +202,11 @@ impl Several {
         let counts: Vec<String> = self.reading.varying.iter().zip(&self.columns).map(count).collect();
         let what = format!("names count several things: {}", counts.join(", "));
         let pattern = self.pattern(&paths[0]);
-        let how = format!("a pattern in quotes such as '{pattern}' chooses one series of frames");
-        Error::input(&paths[0], Note { text: format!("{what}; {how}"), remedy })
+        let how = match self.planes() {
+            Some(_) => "name the folder, or quote the pattern, to stack planes".into(),
+            None => format!("a pattern in quotes such as '{pattern}' chooses one series of frames"),
+        };
+        Error::input(&paths[0], format!("{what}; {how}"))
     }
 
     /// The first name with a star for the number that counts frames.

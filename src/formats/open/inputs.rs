@@ -64,15 +64,21 @@ pub(crate) fn have_headers(inputs: &[PathBuf], options: &OpenOptions) -> bool {
 /// A folder that cannot be listed, an invalid pattern, and either without any such file.
 pub fn files(input: &Path, extension: &str) -> Result<Vec<PathBuf>> {
     if !input.is_dir() {
-        return if !input.exists() && is_pattern(input) { matching(input) } else { Ok(vec![input.into()]) };
+        let is_pattern = !input.exists() && is_pattern(input);
+        return if is_pattern { Ok(in_order(matching(input)?)) } else { Ok(vec![input.into()]) };
     }
     let mut files = visible_files(input)?;
     files.retain(|file| self::extension(file) == extension);
     if files.is_empty() {
         return Err(Error::path(input, format!("has no .{extension} file")));
     }
-    numbering::sort(&mut files)?;
-    Ok(files)
+    Ok(in_order(files))
+}
+
+/// Files in the order of their numbers. Names that count several things stay in the order of their letters.
+fn in_order(mut files: Vec<PathBuf>) -> Vec<PathBuf> {
+    let _ = numbering::sort(&mut files);
+    files
 }
 
 fn expand_one(input: &Path, options: &OpenOptions) -> Result<FrameFiles> {
@@ -139,7 +145,7 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
     if paths.is_empty() {
         return Err(refused("no file matches this pattern".into()));
     }
-    numbering::sort(&mut paths)?;
+    alphanumeric_sort::sort_path_slice(&mut paths);
     Ok(paths)
 }
 

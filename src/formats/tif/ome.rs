@@ -5,6 +5,7 @@ use crate::shared::words::number;
 use crate::shared::xml::{attribute, required};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
+use std::collections::BTreeMap;
 use wavesplat_core::source::Parsed;
 
 /// Units of length in micrometres, and their names here.
@@ -27,16 +28,47 @@ pub(super) fn is_ome(said: &str) -> bool {
 /// Reads the only image.
 pub(super) fn parse(said: &str) -> Parsed<Stack> {
     let mut reader = Reader::from_str(said);
-    let mut stack = None;
+    let (mut stack, mut stamps) = (None, BTreeMap::new());
     loop {
         let event = reader.read_event();
         let failed = |e| format!("has OME-XML that is not well-formed at byte {}: {e}", reader.error_position());
         match event.map_err(failed)? {
+            Event::Start(e) | Event::Empty(e) if e.local_name().as_ref() == "Plane" => stamp(&e, &mut stamps)?,
             Event::Start(e) | Event::Empty(e) => element(&e, &mut stack)?,
-            Event::Eof => return stack.ok_or_else(|| "has OME-XML without <Pixels>".into()),
+            Event::Eof => {
+                let stack: Stack = stack.ok_or("has OME-XML without <Pixels>")?;
+                return Ok(with_stamps(stack, stamps));
+            }
             _ => {}
         }
     }
+}
+
+/// The times of frames and their units, by their numbers.
+type Stamps = BTreeMap<usize, (f64, String)>;
+
+/// Takes the time of the first plane of a frame.
+fn stamp(e: &BytesStart<'_>, stamps: &mut Stamps) -> Parsed<()> {
+    let get = |name: &str| attribute(e, name)?.map(|text| number::<usize>(&text, name)).transpose();
+    let (t, z, c) = (get("TheT")?, get("TheZ")?.unwrap_or(0), get("TheC")?.unwrap_or(0));
+    let time = attribute(e, "DeltaT")?.and_then(|text| text.trim().parse::<f64>().ok()).filter(|time| time.is_finite());
+    if let (Some(t), Some(time), (0, 0)) = (t, time, (z, c)) {
+        let unit = attribute(e, "DeltaTUnit")?.unwrap_or_else(|| "s".into());
+        stamps.insert(t, (time, unit));
+    }
+    Ok(())
+}
+
+/// Gives the frames the times of their planes, if no step is said and each has one that is later than the one before, in one
+/// unit.
+fn with_stamps(stack: Stack, stamps: Stamps) -> Stack {
+    let times: Vec<f64> = stamps.values().map(|(time, _)| *time).collect();
+    let Some((_, unit)) = stamps.get(&0).filter(|_| stamps.keys().copied().eq(0..stack.frames)) else { return stack };
+    let is_one_unit = stamps.values().all(|(_, other)| other == unit);
+    if stack.interval.is_some() || !is_one_unit || times.windows(2).any(|pair| pair[1] <= pair[0]) {
+        return stack;
+    }
+    Stack { interval: Some((1.0, unit.clone())), stamps: times, ..stack }
 }
 
 fn element(e: &BytesStart<'_>, stack: &mut Option<Stack>) -> Parsed<()> {

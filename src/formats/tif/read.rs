@@ -80,8 +80,8 @@ impl Described<'_> {
             (Some(letters), own) => {
                 let stack = Stack::along(&named(axes, Some(pages).filter(|pages| *pages > 1), letters)?)?;
                 let own = own.unwrap_or_else(|| stack.clone());
-                let (spacing, space_unit, interval) = (own.spacing, own.space_unit, own.interval);
-                (Stack { spacing, space_unit, interval, ..stack }, None)
+                let Stack { spacing, space_unit, interval, stamps, .. } = own;
+                (Stack { spacing, space_unit, interval, stamps, ..stack }, None)
             }
         };
         let is_one_of_many = count == 1 && !ome::is_ome(self.said); // an OME-TIFF may be in several files

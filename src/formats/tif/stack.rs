@@ -19,6 +19,8 @@ pub(super) struct Stack {
     pub(super) space_unit: Option<String>,
     /// Time between frames, and its unit.
     pub(super) interval: Option<(f64, String)>,
+    /// Times of all frames, if they are said one by one; in the unit of the interval, else in seconds.
+    pub(super) stamps: Vec<f64>,
     /// Whether the rows of a page go along y.
     pub(super) is_turned: bool,
 }
@@ -45,7 +47,8 @@ impl Stack {
         let [frames, planes, channels] = found.map(|(len, _)| len);
         let steps = found.map(|(_, step)| step);
         let (spacing, space_unit, interval) = ([1.0; 3], None, None);
-        Ok(Self { frames, planes, channels, steps, spacing, space_unit, interval, is_turned: false })
+        let (stamps, is_turned) = (Vec::new(), false);
+        Ok(Self { frames, planes, channels, steps, spacing, space_unit, interval, stamps, is_turned })
     }
 
     /// Pages along axes, the slowest first, that end with those of a page.
@@ -117,6 +120,7 @@ impl Stack {
     /// Times of several frames, if it says how far they are apart.
     pub(super) fn times(&self) -> Vec<f64> {
         match &self.interval {
+            _ if self.frames > 1 && self.stamps.len() == self.frames => self.stamps.clone(),
             Some((interval, _)) if self.frames > 1 => (0..self.frames).map(|t| t as f64 * interval).collect(),
             _ => Vec::new(),
         }

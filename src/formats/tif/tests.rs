@@ -104,6 +104,25 @@ fn ome_xml_says_the_order_of_planes() {
 }
 
 #[test]
+fn planes_of_ome_xml_have_times() {
+    let folder = Folder::new();
+    let pages = planes(SampleType::F32, 0..4);
+    let plane = |t: usize, z: usize| {
+        let time = 10 * t * t + z;
+        format!("<Plane TheT=\"{t}\" TheZ=\"{z}\" TheC=\"0\" DeltaT=\"{time}\" DeltaTUnit=\"ms\"/>")
+    };
+    let all: Vec<String> = (0..4).flat_map(|t| (0..3).map(move |z| (t, z))).map(|(t, z)| plane(t, z)).collect();
+    let times = |planes: &[String]| {
+        let text = ome("XYZCT", [3, 1, 4], &planes.concat()).replace(" TimeIncrement=\"0.5\"", "");
+        let file = one(&folder, floats(&pages, &text));
+        let found = crate::open(&file, &OpenOptions::default()).expect("a header").archive().clone();
+        (found.times, found.units.times.unwrap_or_default())
+    };
+    assert_eq!(times(&all), (vec![0.0, 10.0, 40.0, 90.0], "ms".into()));
+    assert_eq!(times(&all[1..]), (Vec::new(), String::new()), "a frame without a time");
+}
+
+#[test]
 fn what_is_not_supported_is_named() {
     let folder = Folder::new();
     let with = |bytes: Vec<u8>, words: &str| refused(&one(&folder, bytes), &OpenOptions::default(), words);
