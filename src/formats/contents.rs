@@ -131,9 +131,12 @@ impl Contents {
         Lattice { dims, first: origin, directions: [0, 1, 2].map(along), spacing, space: String::new() }
     }
 
-    /// The first time and the step between times, if all steps are equal.
+    /// The first time and the step between times, if all steps are equal; none of frames without times.
     pub(super) fn regular_times(&self) -> Option<(f64, f64)> {
         let [first, .., last] = self.times[..] else { return None };
+        if self.numbered {
+            return None;
+        }
         let step = (last - first) / (self.times.len() - 1) as f64;
         let is_near = |(i, time): (usize, &f64)| (first + step * i as f64 - time).abs() <= REGULAR * step;
         (step > 0.0 && self.times.iter().enumerate().all(is_near)).then_some((first, step))
@@ -195,5 +198,6 @@ pub(super) mod testing {
         for irregular in [&[0.0, 0.1, 0.3][..], &[3.0, 2.0, 1.0], &[1.0, 1.0], &[7.0], &[]] {
             assert_eq!(regular(irregular), None, "{irregular:?}");
         }
+        assert_eq!(Contents { numbered: true, ..contents() }.regular_times(), None, "nobody gave them");
     }
 }

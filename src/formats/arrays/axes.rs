@@ -128,7 +128,8 @@ fn by_letters(variable: &Variable, letters: &str) -> Advised<Vec<Option<AxisRole
 fn known(variable: &Variable, all: &[Variable]) -> Vec<Option<AxisRole>> {
     let role = |axis: usize| {
         let by_coordinate = variable.coordinate(axis, all).and_then(role_of_coordinate);
-        by_coordinate.or_else(|| role_of_name(&variable.dims[axis]))
+        let by_label = || role_of_name(&variable.dims[axis]);
+        by_coordinate.or_else(by_label).or_else(|| role_of_name(variable.scale(axis)))
     };
     let mut roles: Vec<_> = (0..variable.lengths.len()).map(role).collect();
     for which in ORDER {
@@ -184,8 +185,11 @@ fn component_axis(variable: &Variable, free: &[usize], is_timed: bool) -> usize 
     short.next().filter(|_| short.next().is_none()).unwrap_or(free.len() - 1)
 }
 
+/// The axis of the modes around an axis of symmetry, as openPMD has them.
+pub(crate) const MODES: &str = "thetamode";
+
 /// Names of axes along which an archive is not continued.
-const BESIDE: [&str; 8] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band"];
+const BESIDE: [&str; 9] = ["member", "ens", "ensemble", "realization", "number", "component", "channel", "band", MODES];
 
 fn is_beside(dim: &str) -> bool {
     BESIDE.contains(&dim.to_lowercase().as_str())
@@ -226,6 +230,7 @@ mod tests {
             sample: Err("none".into()),
             lengths: lengths.to_vec(),
             dims: vec![String::new(); lengths.len()],
+            scales: Vec::new(),
             chunk: chunk.map(<[usize]>::to_vec),
             attributes: Attributes::new(),
         }

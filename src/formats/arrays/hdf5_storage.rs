@@ -1,9 +1,11 @@
 //! The bytes of a file for the crates that read HDF5, and messages about files that they cannot read.
 
+use hdf5_reader::Dataset;
 use hdf5_reader::error::Error as Hdf5Error;
 use hdf5_reader::storage::{DynStorage, Storage, StorageBuffer};
 use std::sync::Arc;
 use wavesplat_core::base::mapped::FileBytes;
+use wavesplat_core::source::Parsed;
 
 /// The bytes of a file for the reader.
 pub(crate) fn storage(file: FileBytes) -> DynStorage {
@@ -44,11 +46,25 @@ const PLUGIN_FILTERS: [(u16, &str); 9] = [
 /// Why something cannot be read. A filter that is not supported is named, with the command that rewrites the file
 /// without it.
 pub(crate) fn reason(error: &Hdf5Error) -> String {
-    let Hdf5Error::UnsupportedFilter(filter) = error else { return error.to_string() };
+    let filter = match error {
+        Hdf5Error::UnsupportedFilter(filter) => filter,
+        Hdf5Error::Context { path, source } => return format!("{path}: {}", reason(source)),
+        Hdf5Error::UnsupportedLayoutClass(3) => return "a virtual dataset, whose samples are in other files".into(),
+        error => return error.to_string(),
+    };
     let Some(id) = filter.strip_prefix("filter id ") else { return error.to_string() };
     let known = PLUGIN_FILTERS.iter().find(|(known, _)| id.parse() == Ok(*known));
     let name = known.map_or_else(|| format!("filter {id}"), |(_, name)| format!("filter {name} ({id})"));
     format!("{name} is not supported; rewrite the file where HDF5 has that filter: h5repack -f GZIP=4 IN OUT")
+}
+
+/// An error for an array that is longer along an axis than it may become: libhdf5 refuses it, too.
+pub(crate) fn check_lengths(dataset: &Dataset) -> Parsed<()> {
+    let (lengths, most) = (dataset.shape(), dataset.max_dims().unwrap_or_default());
+    if lengths.iter().zip(most).all(|(length, most)| length <= most) {
+        return Ok(());
+    }
+    Err(format!("is damaged: its sizes {lengths:?} are above the largest that it may have, {most:?}"))
 }
 
 #[cfg(test)]

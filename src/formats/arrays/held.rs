@@ -148,6 +148,7 @@ fn variable(array: &NamedArray) -> Variable {
         sample: stored_type(array),
         lengths: lengths(array),
         dims: array.dimensions.iter().map(|dimension| dimension.name.clone()).collect(),
+        scales: Vec::new(),
         chunk: array.chunk.clone(),
         attributes: attributes(&array.attributes),
     }

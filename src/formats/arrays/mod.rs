@@ -45,6 +45,11 @@ pub(crate) trait ArrayFile: Send {
     /// All arrays that are in it.
     fn variables(&self) -> Parsed<Vec<Variable>>;
 
+    /// Names that lead to something that is not read, each with what that is, as a sentence.
+    fn elsewhere(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// The numbers of a box of an array, little-endian, the last axis fastest.
     fn read(&self, path: &str, ty: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>>;
 

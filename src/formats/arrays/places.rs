@@ -220,7 +220,15 @@ mod tests {
         let (lengths, dims) = (vec![at.len()], vec!["a".into()]);
         AxisCoordinates::summarise(
             at.to_vec(),
-            &Variable { path: "a".into(), sample: Err("f64".into()), lengths, dims, chunk: None, attributes },
+            &Variable {
+                path: "a".into(),
+                sample: Err("f64".into()),
+                lengths,
+                dims,
+                scales: Vec::new(),
+                chunk: None,
+                attributes,
+            },
         )
     }
 

@@ -16,6 +16,8 @@ pub(crate) struct Variable {
     pub(crate) lengths: Vec<usize>,
     /// Name of each axis; empty where it has none.
     pub(crate) dims: Vec<String>,
+    /// Path of the array that the file ties to each axis as its coordinates; empty where it ties none.
+    pub(crate) scales: Vec<String>,
     /// Chunk lengths, if it is stored in chunks.
     pub(crate) chunk: Option<Vec<usize>>,
     pub(crate) attributes: Attributes,
@@ -53,6 +55,13 @@ pub(crate) fn attributes(all: &[description::Attribute]) -> Attributes {
 }
 
 impl Variable {
+    /// The name of something that is not read: `what` it is.
+    #[cfg(feature = "hdf5")]
+    pub(crate) fn elsewhere(path: String, what: String) -> Self {
+        let (lengths, dims, scales, attributes) = (Vec::new(), Vec::new(), Vec::new(), Attributes::new());
+        Self { path, sample: Err(what), lengths, dims, scales, chunk: None, attributes }
+    }
+
     pub(crate) fn text(&self, attribute: &str) -> Option<&str> {
         match self.attributes.get(attribute)? {
             Attribute::Text(text) => Some(text.trim()),
@@ -78,12 +87,19 @@ impl Variable {
         self.path.rsplit('/').next().unwrap_or_default()
     }
 
-    /// The variable that says where the voxels or frames of an axis are: it has the axis' name, and this one only.
+    /// The name of the array that the file ties to an axis; empty if it ties none.
+    pub(crate) fn scale(&self, axis: usize) -> &str {
+        self.scales.get(axis).and_then(|path| path.rsplit('/').next()).unwrap_or_default()
+    }
+
+    /// The variable that says where the voxels or frames of an axis are: the one that the file ties to the axis, or else
+    /// the one that has the axis' name, and this one only.
     pub(crate) fn coordinate<'a>(&self, axis: usize, all: &'a [Self]) -> Option<&'a Self> {
-        let dim = self.dims[axis].as_str();
+        let (dim, length) = (self.dims[axis].as_str(), [self.lengths[axis]]);
         let folder = &self.path[..self.path.len() - self.name().len()];
-        let is = |v: &&Self| !dim.is_empty() && v.name() == dim && v.lengths == [self.lengths[axis]];
+        let tied = |v: &&Self| self.scales.get(axis) == Some(&v.path) && v.lengths == length;
+        let is = |v: &&Self| !dim.is_empty() && v.name() == dim && v.lengths == length;
         let near = |v: &&Self| is(v) && v.path.strip_suffix(dim) == Some(folder);
-        all.iter().find(near).or_else(|| all.iter().find(is))
+        all.iter().find(tied).or_else(|| all.iter().find(near)).or_else(|| all.iter().find(is))
     }
 }

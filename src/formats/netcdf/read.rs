@@ -2,16 +2,17 @@
 
 use super::layout::FILL;
 use crate::arrays::describe::numbers;
-use crate::arrays::hdf5_storage::{self, storage};
+use crate::arrays::hdf5_storage::{self, check_lengths, storage};
 use crate::arrays::in_place::InPlace;
 use crate::arrays::opener::ReadConfig;
 use crate::arrays::{ArrayArchive, ArrayFile, Attribute, Attributes, Variable};
-use hdf5_reader::Hdf5File;
+use hdf5_reader::{Dataset, Hdf5File};
 use netcdf_reader::classic::data::compute_record_stride;
 use netcdf_reader::error::Error as NcError;
 use netcdf_reader::{
     NcAttrValue, NcAttribute, NcFile, NcGroup, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
 };
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -23,6 +24,9 @@ use wavesplat_core::source::{OpenOptions, Parsed};
 
 /// The NetCDF library's default fill value of floats.
 const UNWRITTEN: f64 = 9.969_209_968_386_869e36;
+
+/// What the NetCDF library puts before the name of a variable that is called as a dimension of others.
+const NO_COORDINATE: &str = "_nc4_non_coord_";
 
 /// Opens a file and lists its arrays.
 pub(crate) fn open(path: &Path, options: &OpenOptions) -> Result<ArrayArchive> {
@@ -54,14 +58,15 @@ struct NetCdfArrayFile {
 
 impl ArrayFile for NetCdfArrayFile {
     fn variables(&self) -> Parsed<Vec<Variable>> {
+        self.check()?;
         let mut all = Vec::new();
-        self.add(self.file.root_group().map_err(|e| e.to_string())?, "", &mut all);
+        self.add(self.file.root_group().map_err(|e| reason(&e))?, "", &mut all);
         Ok(all)
     }
 
     fn read(&self, path: &str, _: StoredType, ranges: &[Range<usize>]) -> Parsed<Vec<u8>> {
         // The stored type. Its bytes are the same if the samples are declared unsigned.
-        let stored = stored_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype(), false)?;
+        let stored = stored_type(self.found(path)?.dtype(), false)?;
         let selected = |r: &Range<usize>| NcSliceInfoElem::Slice { start: r.start as u64, end: r.end as u64, step: 1 };
         let slice = NcSliceInfo { selections: ranges.iter().map(selected).collect() };
         self.bytes(path, stored, Some(&slice))
@@ -79,36 +84,36 @@ impl ArrayFile for NetCdfArrayFile {
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
-        let numbers = self.file.read_variable_as_f64(path).map_err(|e| format!("{path}: {}", reason(&e)))?;
+        let numbers = self.file.read_variable_as_f64(&self.stored(path)).map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().collect())
     }
 
     fn described(&self, path: &str) -> Vec<description::Attribute> {
         let of_file = || self.file.global_attributes().unwrap_or_default();
-        let of_variable = || self.file.variable(path).map(NcVariable::attributes).unwrap_or_default();
+        let of_variable = || self.found(path).map(NcVariable::attributes).unwrap_or_default();
         let all = if path.is_empty() { of_file() } else { of_variable() };
         let one = |a: &NcAttribute| Some(description::Attribute { name: a.name.clone(), value: described(&a.value)? });
         all.iter().filter_map(one).collect()
     }
 
     fn values(&self, path: &str) -> Parsed<description::Values> {
-        let variable = self.file.variable(path).map_err(|e| e.to_string())?;
+        let variable = self.found(path)?;
         if *variable.dtype() == NcType::String {
-            return self.file.read_variable_as_strings(path).map(description::Values::Texts).map_err(|e| reason(&e));
+            return self.file.read_variable_as_strings(&self.stored(path)).map(description::Values::Texts).map_err(|e| reason(&e));
         }
         let bytes = match variable.dtype() {
-            NcType::Char => self.file.read_variable_raw_bytes(path).map_err(|e| reason(&e))?,
+            NcType::Char => self.file.read_variable_raw_bytes(&self.stored(path)).map_err(|e| reason(&e))?,
             ty => self.bytes(path, stored_type(ty, false)?, None)?,
         };
         Ok(numbers(number_type(variable.dtype())?, &bytes))
     }
 
     fn number_type(&self, path: &str) -> Parsed<NumberType> {
-        number_type(self.file.variable(path).map_err(|e| e.to_string())?.dtype())
+        number_type(self.found(path)?.dtype())
     }
 
     fn growing_axes(&self, path: &str) -> Vec<usize> {
-        let Ok(variable) = self.file.variable(path) else { return Vec::new() };
+        let Ok(variable) = self.found(path) else { return Vec::new() };
         let dimensions = variable.dimensions();
         (0..dimensions.len()).filter(|axis| dimensions[*axis].is_unlimited).collect()
     }
@@ -120,8 +125,38 @@ impl ArrayFile for NetCdfArrayFile {
 }
 
 impl NetCdfArrayFile {
+    /// An error for arrays that are longer than they may be.
+    fn check(&self) -> Parsed<()> {
+        let Some(hdf5) = &self.hdf5 else { return Ok(()) };
+        let mut groups = vec![hdf5.root_group().map_err(|e| hdf5_storage::reason(&e))?];
+        let mut seen = HashSet::new();
+        while let Some(group) = groups.pop() {
+            if seen.insert(group.address()) {
+                let (inner, arrays) = group.members().map_err(|e| hdf5_storage::reason(&e))?;
+                let sound = |array: &Dataset| check_lengths(array).map_err(|e| format!("{}: {e}", array.name()));
+                arrays.iter().try_for_each(sound)?;
+                groups.extend(inner);
+            }
+        }
+        Ok(())
+    }
+
+    fn found(&self, path: &str) -> Parsed<&NcVariable> {
+        self.file.variable(&self.stored(path)).map_err(|e| e.to_string())
+    }
+
+    /// The path of a variable in the file, in which one that is named as another's dimension has a prefix.
+    fn stored(&self, path: &str) -> String {
+        let (group, name) = path.rsplit_once('/').map_or(("", path), |(group, _)| path.split_at(group.len() + 1));
+        match self.hdf5.is_none() || self.file.variable(path).is_ok() {
+            true => path.into(),
+            false => format!("{group}{NO_COORDINATE}{name}"),
+        }
+    }
+
     /// The numbers of an array, or of a part of it, as they are stored.
     fn bytes(&self, path: &str, ty: StoredType, slice: Option<&NcSliceInfo>) -> Parsed<Vec<u8>> {
+        let path = &self.stored(path);
         macro_rules! read {
             ($ty:ty) => {{
                 let numbers = match slice {
@@ -148,7 +183,9 @@ impl NetCdfArrayFile {
 
     fn add(&self, group: &NcGroup, path: &str, all: &mut Vec<Variable>) {
         for variable in &group.variables {
-            all.push(self.variable(variable, format!("{path}{}", variable.name())));
+            let name = variable.name();
+            let name = name.strip_prefix(NO_COORDINATE).filter(|_| self.hdf5.is_some()).unwrap_or(name);
+            all.push(self.variable(variable, format!("{path}{name}")));
         }
         for group in &group.groups {
             self.add(group, &format!("{path}{}/", group.name), all);
@@ -157,7 +194,7 @@ impl NetCdfArrayFile {
 
     fn variable(&self, found: &NcVariable, path: String) -> Variable {
         let dims = found.dimensions();
-        let chunk = self.hdf5.as_ref().and_then(|file| file.dataset(&path).ok()?.chunks());
+        let chunk = self.hdf5.as_ref().and_then(|file| file.dataset(&self.stored(&path)).ok()?.chunks());
         let chunk = chunk.filter(|chunk| chunk.len() == dims.len());
         let mut attributes = attributes(found);
         let unsigned = attributes.get("_Unsigned") == Some(&Attribute::Text("true".into()));
@@ -177,6 +214,7 @@ impl NetCdfArrayFile {
             sample,
             lengths: dims.iter().map(|dim| usize::try_from(dim.size).unwrap_or(usize::MAX)).collect(),
             dims: dims.iter().map(|dim| dim.name.clone()).collect(),
+            scales: Vec::new(),
             chunk: chunk.map(|chunk| chunk.into_iter().map(|n| n as usize).collect()),
             attributes,
             path,

@@ -93,7 +93,8 @@ impl NiftiBytes<Vec<u8>> {
     fn set_samples(&mut self, contents: &Contents, ty: SampleType) {
         let (at, [x, y, z]) = (self.offsets(), contents.lattice().dims);
         let frames = contents.frames.len();
-        let lengths = [if frames == 1 { 3 } else { 4 }, x, y, z, frames, 1, 1, 1];
+        let was_one = (self.length(at.dim, 0), self.length(at.dim, 4)) == (4, 1); // some programs ask for the fourth axis
+        let lengths = [if frames == 1 && !was_one { 3 } else { 4 }, x, y, z, frames, 1, 1, 1];
         for (i, length) in lengths.into_iter().enumerate() {
             match self.is_first() {
                 true => self.put(at.dim + 2 * i, (length as i16).to_le_bytes()),
@@ -122,6 +123,8 @@ impl NiftiBytes<Vec<u8>> {
         if let Some((first, step)) = contents.regular_times() {
             self.set_real(at.pixdim, 4, step);
             self.set_real(at.toffset, 0, first);
+        } else if contents.frames.len() > 1 && self.real(at.pixdim, 4) > 0.0 {
+            self.set_real(at.pixdim, 4, 0.0); // the step of the source is not that of these frames
         }
         if self.sform_code() > 0 {
             self.set_sform(&lattice);
@@ -194,6 +197,8 @@ mod tests {
         assert_eq!([0, 1, 2, 3, 4].map(dim), [4, 5, 4, 3, 3]);
         assert_eq!([1, 2, 3, 4].map(|i| header.real(76, i)), [0.5, 2.0, 1.0, 0.25]);
         assert_eq!((header.sform_code(), header.real(280, 3), header.real(280, 11)), (ALIGNED, -1.0, 7.5));
+        let step = |contents: &Contents| written(contents).real(76, 4);
+        assert_eq!(step(&Contents { numbered: true, ..contents() }), 0.0, "nobody gave times");
         let mut long = contents();
         long.grid.dims[0] = LONGEST_OF_FIRST + 1;
         let header = written(&long);

@@ -7,7 +7,7 @@ use super::layout::{NAME, TYPES};
 use crate::shared::directions::Placed;
 use crate::shared::sequence::stamped_note;
 use std::path::Path;
-use wavesplat_core::base::description::{Attribute, Description, Values};
+use wavesplat_core::base::description::{Attribute, AxisRole, Description, LPS, RAS, Values};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::stored::StoredType;
@@ -34,11 +34,24 @@ pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader>
 
 /// The directions of the axes, and the keys and values of users; none if axes ascend along those of an unnamed world.
 fn description(header: &NrrdHeader, array: &NrrdSamples) -> Parsed<Option<Description>> {
-    let space = header.get("space").unwrap_or_default();
+    let space = &space(header.get("space").unwrap_or_default());
     let is_plain = space.is_empty() && header.keys.is_empty() && array.placed.is_plain();
     let text = |(name, value): &(String, String)| Attribute { name: name.clone(), value: Values::text(value) };
     let described = array.axes.placed(header)?.description(NAME, space, &array.layout);
     Ok((!is_plain).then(|| Description { global: header.keys.iter().map(text).collect(), ..described }))
+}
+
+/// The name of a space of three axes: that of one with time, too, and of one that is named by its first letters.
+fn space(name: &str) -> String {
+    let bare = name.trim().to_lowercase();
+    let bare = bare.strip_suffix("-time").unwrap_or(&bare);
+    match bare {
+        "ras" | "rast" => RAS.into(),
+        "lps" | "lpst" => LPS.into(),
+        "las" | "last" => "left-anterior-superior".into(),
+        RAS | LPS => bare.into(),
+        _ => name.trim().trim_end_matches("-time").into(),
+    }
 }
 
 impl NrrdSamples {

@@ -74,7 +74,8 @@ impl Dataset {
     /// Dimensions, variables and attributes as the source has them.
     fn from_source(contents: &Contents, description: &Description, ty: SampleType) -> Self {
         let dimensions = named_dimensions(description);
-        let mut names: BTreeSet<String> = BTreeSet::from([sound(&contents.name)]);
+        let samples_name = unlike_others(&contents.name, &dimensions, description);
+        let mut names: BTreeSet<String> = BTreeSet::from([samples_name.clone()]);
         let is_new = |name: &String| names.insert(name.clone());
         let own = description.variables.iter().map(|variable| {
             let values = match &variable.values {
@@ -91,7 +92,7 @@ impl Dataset {
             move |variable| is_new(&variable.name)
         });
         let samples = SamplesVariable {
-            name: sound(&contents.name),
+            name: samples_name,
             dimensions: description.axes.iter().map(|axis| axis.dimension as usize).collect(),
             ty,
             attributes: samples_attributes(contents, description),
@@ -185,6 +186,19 @@ fn text(name: &str, value: &str) -> Attribute {
 fn sound(name: &str) -> String {
     let name: String = name.chars().map(|c| if c.is_control() || c == '/' { '_' } else { c }).collect();
     if name.is_empty() { "unnamed".into() } else { name }
+}
+
+/// A name for the samples that neither a dimension, whose name its coordinates have, nor another variable has.
+fn unlike_others(name: &str, dimensions: &[(String, u64)], description: &Description) -> String {
+    let is_taken = |name: &str| {
+        let mut others = description.variables.iter().map(|variable| sound(&variable.name));
+        dimensions.iter().any(|(other, _)| other == name) || others.any(|other| other == name)
+    };
+    let mut own = sound(name);
+    while is_taken(&own) {
+        own = format!("values_{own}");
+    }
+    own
 }
 
 /// The variable's name in letters, digits and underscores, different from all dimensions.

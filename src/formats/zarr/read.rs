@@ -201,7 +201,7 @@ fn add(
 /// An array that cannot be read, and why.
 fn unread(path: &str, why: String) -> Variable {
     let (lengths, dims) = (Vec::new(), Vec::new());
-    Variable { path: path.into(), sample: Err(why), lengths, dims, chunk: None, attributes: Attributes::new() }
+    Variable { path: path.into(), sample: Err(why), lengths, dims, scales: Vec::new(), chunk: None, attributes: Attributes::new() }
 }
 
 fn variable(array: &Array<FilesystemStore>) -> Variable {
@@ -216,6 +216,7 @@ fn variable(array: &Array<FilesystemStore>) -> Variable {
         sample: stored_type(array.data_type()),
         dims: vec![String::new(); lengths.len()],
         lengths,
+        scales: Vec::new(),
         chunk,
         attributes: attributes(array),
     };

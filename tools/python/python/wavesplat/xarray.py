@@ -101,11 +101,12 @@ class WavesplatBackend(BackendEntrypoint):
 
 def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
     """The variables that a file stands for, as its source encoded them, and global attributes."""
-    samples = _samples(file)
     described = file.description
     if described is None:
+        samples = _samples(file, set())
         return {**samples, **_coordinates(file, set(samples))}, {}
-    others = {name: variable for name, variable in _kept(file, described) if name not in samples}
+    others = dict(_kept(file, described))
+    samples = _samples(file, set(others))
     return {**samples, **others, **_coordinates(file, {*samples, *others})}, attributes(described["global"])
 
 
@@ -128,11 +129,13 @@ def _typed(times: npt.NDArray[np.float64], dtype: str) -> npt.NDArray[Any]:
     return typed if np.array_equal(typed, times) else times
 
 
-def _samples(file: File) -> dict[str, xr.Variable]:
-    """The samples, or those of each colour."""
+def _samples(file: File, others: set[str]) -> dict[str, xr.Variable]:
+    """The samples, or those of each colour. Dimensions and other variables keep their names."""
     base = (file.variable or "data").split("[")[0]
-    names = (base,) if file.channels == 1 else _COLOURS
     dims = [axis.name for axis in file._axes.source]
+    while base in others or base in dims:
+        base = f"values_{base}"
+    names = (base,) if file.channels == 1 else _COLOURS
     attrs = dict(file.attrs)
     if file.unit is not None:
         attrs.setdefault("units", file.unit)
