@@ -93,7 +93,8 @@ fn places<'a>(lengths: &[usize], kept: impl Iterator<Item = &'a Kept>) -> Vec<us
 }
 
 /// Joins descriptions in time: values along time follow each other, and everything else is taken from `first`. Leaves
-/// out variables along time that one of them lacks or has in another form, and returns their names.
+/// out variables along time that one of them lacks or has in another form, and the largest ones if together they would be
+/// too large for a file, and returns their names.
 pub fn joined(mut first: Description, more: &[Description]) -> (Description, Vec<String>) {
     let Some(time) = frames_of(&first) else { return (first, Vec::new()) };
     let (mut lost, mut kept) = (Vec::new(), Vec::new());
@@ -111,7 +112,24 @@ pub fn joined(mut first: Description, more: &[Description]) -> (Description, Vec
     let frames = |other: &Description| frames_of(other).map_or(0, |time| other.dimensions[time as usize].length);
     first.dimensions[time as usize].length += more.iter().map(frames).sum::<u64>();
     first.variables = kept;
+    while first.check_size().is_err()
+        && let Some(at) = largest_along_time(&first)
+    {
+        lost.push(first.variables.remove(at).name);
+    }
     (first, lost)
+}
+
+/// The variable along time and other axes that has the most values.
+fn largest_along_time(all: &Description) -> Option<usize> {
+    let time = frames_of(all)?;
+    let count = |variable: &Variable| match &variable.values {
+        Values::Numbers(numbers) => numbers.count(),
+        Values::Texts(texts) => texts.len(),
+        Values::Times(_) => 0,
+    };
+    let is_along = |at: &usize| all.variables[*at].dimensions.len() > 1 && all.variables[*at].dimensions.contains(&time);
+    (0..all.variables.len()).filter(is_along).max_by_key(|at| count(&all.variables[*at]))
 }
 
 /// Extends a description to `frames` frames, without knowing values for the added ones. Leaves out the variables along

@@ -43,6 +43,14 @@ enum Shown {
     Second(usize),
 }
 
+/// The seconds from one date to another, in the standard calendar; `None` if one of them is no date.
+pub fn seconds_since(first: &str, date: &str) -> Option<f64> {
+    let clock = |date: &str| Clock::parse(&format!("seconds since {date}"), None).ok();
+    let mut times = [0.0];
+    clock(date)?.convert(&mut times, clock(first)?).ok()?;
+    Some(times[0])
+}
+
 impl TimeLabels {
     /// The times of frames in a unit, perhaps since a date of a calendar; no times if frames are numbered.
     pub fn new(times: Vec<f64>, unit: Option<&str>, calendar: Option<&str>) -> Self {

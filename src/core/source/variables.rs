@@ -51,7 +51,10 @@ impl Display for VariableAxis {
 impl Display for VariableInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axes: Vec<String> = self.axes.iter().map(ToString::to_string).collect();
-        write!(f, "{}: {} ({})", self.name, self.sample, axes.join(", "))?;
+        write!(f, "{}: {}", self.name, self.sample)?;
+        if !axes.is_empty() {
+            write!(f, " ({})", axes.join(", "))?;
+        }
         if self.components > 1 {
             let (name, last) = (&self.name, self.components - 1);
             write!(f, ", {} components {name}[0] to {name}[{last}]", self.components)?;
@@ -87,6 +90,8 @@ mod tests {
         let unnamed = vec![VariableAxis { name: String::new(), length: 7 }];
         let steps = VariableInfo { axes: unnamed, steps: 5, ..VariableInfo::volume("p", "i64", [1; 3], 1) };
         assert_eq!(steps.to_string(), "p: i64 (7), 5 steps");
+        let alone = VariableInfo { axes: Vec::new(), ..VariableInfo::volume("v", "a virtual dataset", [1; 3], 1) };
+        assert_eq!(alone.to_string(), "v: a virtual dataset");
         assert_eq!(listed(&[]), " none");
         assert!(listed(&vec![steps; 25]).ends_with("\n  and 5 more"));
     }

@@ -1,12 +1,13 @@
 //! One variable of a file of arrays as frames.
 
-use super::choose::{self, Choice};
+use super::choose;
 use super::chunks::Chunks;
 use super::opener::{OpenFile, Opener};
 use super::places::Places;
 use super::resolve::{Context, ResolvedArray};
 use super::sibling_times::StepArrays;
-use super::{ArrayFile, FileArrays, Variable, openpmd, vtkhdf};
+use super::steps::Choice;
+use super::{ArrayFile, FileArrays, Variable, minc, openpmd, vtkhdf};
 use crate::numbering;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Note, Result};
@@ -14,6 +15,9 @@ use wavesplat_core::base::mapped::{Access, FileBytes, State};
 use wavesplat_core::source::file_header::FileHeader;
 use wavesplat_core::source::parts::Part;
 use wavesplat_core::source::{Advised, Extent, OpenOptions, Parsed};
+
+/// Names that lead elsewhere, each with a note.
+const MOST_NOTES: usize = 3;
 
 /// An open file of arrays.
 pub(crate) struct ArrayArchive {
@@ -51,6 +55,7 @@ impl ArrayArchive {
     /// All arrays, or those of an image in VTKHDF.
     fn variables(&self) -> Parsed<(Vec<Variable>, Option<vtkhdf::Image>)> {
         let all = self.file.variables()?;
+        minc::refuse(&all)?;
         let image = vtkhdf::Image::read(self.file.as_ref(), &all)?;
         Ok((image.as_ref().map_or(all, |image| image.variables.clone()), image))
     }
@@ -84,13 +89,16 @@ impl ArrayArchive {
             parts.push(self.part(found, state)?);
         }
         let mut described = joined(found, parts).map_err(refused)?;
-        if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice) {
+        let frames: usize = described.parts.iter().map(|part| part.frames).sum();
+        let has_none = choice.arrays.len() > 1 || described.times.is_empty() && frames == 1;
+        if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice).filter(|_| has_none) {
             (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
         }
         if choice.arrays.len() > 1 {
             take_times(&mut described, arrays, &choice);
             described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
         }
+        described.notes.extend(on_elsewhere(self.file.elsewhere()).into_iter().map(Note::from));
         Ok(described)
     }
 
@@ -104,6 +112,14 @@ impl ArrayArchive {
         let chunks = Chunks::new(&found.variable, &found.axes, found.order.clone(), &self.opener)?;
         found.decoded(path, state, chunks).map_err(refused)
     }
+}
+
+/// Notes on some of the names that lead elsewhere, and on how many more there are.
+fn on_elsewhere(mut all: Vec<String>) -> Vec<String> {
+    let more = all.len().saturating_sub(MOST_NOTES);
+    all.truncate(MOST_NOTES);
+    all.extend((more > 0).then(|| format!("{more} more names lead to what is not read")));
+    all
 }
 
 /// Uses the times stored beside the arrays, if the steps have no times of their own.

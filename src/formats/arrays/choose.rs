@@ -1,38 +1,22 @@
 //! Which variable of a file is meant.
 
 use super::Variable;
+use super::steps::{self, Choice, STEP, grouped};
 use crate::shared::component;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 use wavesplat_core::base::error::{Note, Remedy};
 use wavesplat_core::source::variables::{self, VariableAxis};
 use wavesplat_core::source::{self, Advised, Parsed};
 
-/// The placeholder for the step number in the path of a variable that has one array per step.
-pub(crate) const STEP: &str = "%T";
-
-/// A variable: an array, or one for each step.
-#[derive(Debug, Clone)]
-pub(crate) struct Choice<'a> {
-    /// Its path, with [`STEP`] where arrays differ.
-    pub(crate) path: String,
-    /// Not empty.
-    pub(crate) arrays: Vec<&'a Variable>,
-    /// Number of the step of each; none of a single array.
-    pub(crate) steps: Vec<u64>,
-}
-
-impl<'a> Choice<'a> {
-    fn single(array: &'a Variable) -> Self {
-        Self { path: array.shown().into(), arrays: vec![array], steps: Vec::new() }
+impl Choice<'_> {
+    /// Whether a name is that of its array, or the end of its path.
+    fn ends_with(&self, name: &str) -> bool {
+        let path = self.arrays[0].shown();
+        path == name || path.strip_suffix(name).is_some_and(|before| before.ends_with('/'))
     }
 
-    fn name(&self) -> &str {
-        self.arrays[0].name()
-    }
-
-    /// The group of its steps.
-    pub(crate) fn group(&self) -> &str {
-        self.path.split(STEP).next().and_then(|before| before.rsplit_once('/')).map_or("", |(group, _)| group)
+    fn is_active(&self, active: Option<&str>) -> bool {
+        active == Some(self.arrays[0].name())
     }
 
     /// Name, size, type and unit for users.
@@ -50,25 +34,40 @@ impl<'a> Choice<'a> {
     }
 }
 
-/// Finds the variable by its path, or by its name if only one variable has that name. Also returns the given index,
-/// such as that of a component.
+/// Finds the variable by its path, or by its name or the end of its path if only one variable has that. Also returns
+/// the given index, such as that of a component.
 pub(crate) fn named<'a>(all: &'a [Variable], given: &str) -> Parsed<(Choice<'a>, Option<usize>)> {
-    let stepped = choices(all.iter());
-    let singles: Vec<_> = all.iter().map(Choice::single).collect();
-    let choices = if given.contains(STEP) { &stepped } else { &singles };
-    let find = |name: &str| {
-        let mut of_name = choices.iter().filter(|c| c.name() == name);
-        let by_path = choices.iter().find(|c| c.path == name.trim_start_matches('/'));
-        by_path.or(of_name.next().filter(|_| of_name.next().is_none())).cloned()
-    };
     let (name, index) = component::named(given);
-    let of_steps = |name: &str| {
-        let mut of_name = stepped.iter().filter(|c| c.name() == name && !c.steps.is_empty());
-        of_name.next().filter(|_| of_name.next().is_none()).cloned()
+    let found = found(all, given).map(|choice| (choice, None));
+    let (choice, index) = match found.or_else(|| Some((self::found(all, name)?, index))) {
+        Some(found) => found,
+        None => return Err(not_found(all, name)),
     };
-    let found = find(given).or_else(|| of_steps(given)).map(|choice| (choice, None));
-    let found = found.or_else(|| Some((find(name).or_else(|| of_steps(name))?, index)));
-    found.ok_or_else(|| format!("has no variable {name}; it has{}", listed(&stepped)))
+    if steps::has_twins(&choice) {
+        return Err(format!("{}: two arrays have the same step number", choice.path));
+    }
+    Ok((choice, index))
+}
+
+fn found<'a>(all: &'a [Variable], given: &str) -> Option<Choice<'a>> {
+    if given.contains(STEP) {
+        return steps::matching(all, given);
+    }
+    let singles: Vec<_> = all.iter().map(Choice::single).collect();
+    let only = |choices: Vec<Choice<'a>>| {
+        let mut of_name = choices.into_iter().filter(|choice| choice.ends_with(given));
+        of_name.next().filter(|_| of_name.next().is_none())
+    };
+    let by_path = singles.iter().find(|choice| choice.path == given.trim_start_matches('/')).cloned();
+    let of_steps = || grouped(all.iter()).into_iter().filter(|choice| !choice.steps.is_empty()).collect();
+    by_path.or_else(|| only(singles)).or_else(|| only(of_steps()))
+}
+
+/// An error that lists what there is, and the same path with another number.
+fn not_found(all: &[Variable], name: &str) -> String {
+    let other = steps::templates(name.trim_start_matches('/')).find(|path| steps::matching(all, path).is_some());
+    let other = other.map_or_else(String::new, |path| format!("; {STEP} stands for a number that differs: {path}"));
+    format!("has no variable {name}{other}; it has{}", listed(&grouped(all.iter())))
 }
 
 /// The one variable that can be an archive, or of several the one that is `active`.
@@ -76,7 +75,7 @@ pub(crate) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Advised<Cho
     let mut volumes = volumes(all, active);
     match volumes.len() {
         1 => Ok(volumes.remove(0)),
-        0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&choices(all.iter()))).into()),
+        0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&grouped(all.iter()))).into()),
         _ => Err(Note::with(format!("has several variables:{}", listed(&volumes)), Remedy::ChooseVariable)),
     }
 }
@@ -93,54 +92,16 @@ fn volumes<'a>(all: &'a [Variable], active: Option<&str>) -> Vec<Choice<'a>> {
     let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
     let of_width = |is_64_bit: bool| {
         let is_so = move |v: &Variable| v.sample.as_ref().is_ok_and(|ty| ty.is_64_bit() == is_64_bit);
-        choices(all.iter().filter(|v| is_so(v) && is_volume(v, least) && !bounds.contains(v.name())))
+        grouped(all.iter().filter(|v| is_so(v) && is_volume(v, least) && !bounds.contains(v.name())))
     };
     let mut volumes = of_width(false);
     if volumes.is_empty() {
         volumes = of_width(true); // numbers of cells, say, where there is nothing else
     }
-    match volumes.iter().position(|c| active == Some(c.name())) {
+    match volumes.iter().position(|c| c.is_active(active)) {
         Some(at) => vec![volumes.swap_remove(at)],
         None => volumes,
     }
-}
-
-/// Groups arrays into variables: arrays whose paths differ only in the number of one group are one variable.
-fn choices<'a>(all: impl Iterator<Item = &'a Variable>) -> Vec<Choice<'a>> {
-    let (mut steps, mut found): (BTreeMap<_, Vec<_>>, _) = (BTreeMap::new(), Vec::new());
-    for array in all {
-        match templated(&array.path) {
-            Some((path, step)) => steps.entry(path).or_default().push((step, array)),
-            None => found.push(Choice::single(array)),
-        }
-    }
-    for (path, mut arrays) in steps {
-        arrays.sort_by_key(|(step, _)| *step);
-        match &arrays[..] {
-            [(_, only)] => found.push(Choice::single(only)),
-            _ => {
-                let (steps, arrays) = arrays.into_iter().unzip();
-                found.push(Choice { path, arrays, steps });
-            }
-        }
-    }
-    found
-}
-
-/// A path with [`STEP`] for the number at the end of its first group that has one, or of all of its last part.
-fn templated(path: &str) -> Option<(String, u64)> {
-    let path = path.trim_start_matches('/');
-    let parts: Vec<&str> = path.split('/').collect();
-    let stem = |part: &str| part.trim_end_matches(|c: char| c.is_ascii_digit()).len();
-    let (at, stem) = parts
-        .iter()
-        .map(|part| stem(part))
-        .enumerate()
-        .find(|(i, stem)| *stem < parts[*i].len() && (*i + 1 < parts.len() || *stem == 0))?;
-    let step = parts[at][stem..].parse().ok()?;
-    let part = format!("{}{STEP}", &parts[at][..stem]);
-    let named = parts.iter().enumerate().map(|(i, part_of)| if i == at { part.as_str() } else { part_of });
-    Some((named.collect::<Vec<_>>().join("/"), step))
 }
 
 /// Names of variables that other variables name as their coordinates.
@@ -157,18 +118,4 @@ fn is_volume(variable: &Variable, least: usize) -> bool {
 
 fn listed(all: &[Choice<'_>]) -> String {
     variables::listed(&all.iter().map(Choice::info).collect::<Vec<_>>())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_of_groups_are_steps() {
-        let found = |path: &str| templated(path).map(|(path, step)| format!("{path} {step}"));
-        assert_eq!(found("/data/10/fields/E1").as_deref(), Some("data/%T/fields/E1 10"));
-        assert_eq!(found("Timestep_007/u2").as_deref(), Some("Timestep_%T/u2 7"));
-        assert_eq!(found("frames/3").as_deref(), Some("frames/%T 3"));
-        assert_eq!((found("u1"), found("fields/u1"), found("")), (None, None, None));
-    }
 }

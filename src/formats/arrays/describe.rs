@@ -1,6 +1,7 @@
 //! The description in a file of arrays: dimensions, attributes, coordinates and other small arrays.
 
 use super::{ArrayFile, Variable};
+use std::collections::HashSet;
 use wavesplat_core::base::description::{
     ArrayAxis, Attribute, AxisRole, Description, Dimension, Values, Variable as Described, frames_of, select,
 };
@@ -41,7 +42,9 @@ pub(crate) fn description(
     all: &[Variable],
     samples: &Samples<'_>,
 ) -> (Description, Vec<String>) {
-    let mut builder = Builder { file, samples, found: Description { source: source.into(), ..Description::default() } };
+    let coordinates = named_coordinates(file, all, samples.variable);
+    let found = Description { source: source.into(), ..Description::default() };
+    let mut builder = Builder { file, samples, coordinates, found };
     builder.add_axes();
     builder.found.attributes = builder.attributes();
     builder.found.global = file.described("").into_iter().filter(is_users).collect();
@@ -49,9 +52,23 @@ pub(crate) fn description(
     (builder.found, left_out)
 }
 
+/// Names that the samples or the whole file give as `coordinates`, and those in the formulas of coordinates.
+fn named_coordinates(file: &dyn ArrayFile, all: &[Variable], samples: &Variable) -> HashSet<String> {
+    let of_file = file.described("").into_iter().filter(|attribute| attribute.name == "coordinates");
+    let of_file = of_file.filter_map(|attribute| match attribute.value {
+        Values::Texts(texts) => Some(texts.join(" ")),
+        Values::Numbers(_) | Values::Times(_) => None,
+    });
+    let formulas = all.iter().filter_map(|variable| variable.text("formula_terms"));
+    let texts = samples.text("coordinates").into_iter().chain(formulas).map(String::from).chain(of_file);
+    texts.flat_map(|text| text.split_whitespace().map(String::from).collect::<Vec<_>>()).collect()
+}
+
 struct Builder<'a> {
     file: &'a dyn ArrayFile,
     samples: &'a Samples<'a>,
+    /// Names of arrays that say where the samples are.
+    coordinates: HashSet<String>,
     found: Description,
 }
 
@@ -100,6 +117,10 @@ impl Builder<'_> {
         let mut near: Vec<&Variable> = all.iter().filter(|other| self.belongs(other)).collect();
         near.sort_by_key(|variable| count(variable)); // so that the largest are left out
         for variable in near {
+            if stored_bytes(variable) > MOST_BYTES && self.samples.times != Some(variable.path.as_str()) {
+                left_out.push(variable.name().to_string());
+                continue;
+            }
             let Ok(values) = self.values(variable) else { continue };
             let size = held_bytes(&values);
             if size > MOST_BYTES || bytes + size > MOST_BYTES_TOGETHER {
@@ -133,7 +154,23 @@ impl Builder<'_> {
             return true;
         }
         let is_read = *extent == Extent::Whole || along_time;
-        other.path != variable.path && group(variable).starts_with(&group(other)) && is_named && is_small && is_read
+        if self.tied(other).is_some() {
+            return is_read;
+        }
+        let is_kept = is_small || self.is_coordinate(other);
+        other.path != variable.path && group(variable).starts_with(&group(other)) && is_named && is_kept && is_read
+    }
+
+    /// The axis of the samples to which the file ties an array as its coordinates.
+    fn tied(&self, other: &Variable) -> Option<usize> {
+        let Samples { variable, axes, .. } = self.samples;
+        let is_whole = |axis: &usize| axes[*axis].role != AxisRole::Single;
+        (0..axes.len()).find(|axis| variable.scales.get(*axis) == Some(&other.path) && is_whole(axis))
+    }
+
+    /// Whether the samples or the whole file name an array as coordinates, or a coordinate names it in its formula.
+    fn is_coordinate(&self, other: &Variable) -> bool {
+        self.coordinates.contains(other.name())
     }
 
     /// The values of an array. Along an axis with a chosen index, only the values at that index.
@@ -156,7 +193,12 @@ impl Builder<'_> {
     }
 
     fn add(&mut self, variable: &Variable, values: Values) {
-        let kept: Vec<(String, usize)> = variable.dims.iter().cloned().zip(variable.lengths.iter().copied()).collect();
+        let tied = self.tied(variable).map(|axis| self.samples.variable.dims[axis].clone());
+        let (name, dims) = match tied {
+            Some(axis) => (axis.clone(), vec![axis]),
+            None => (variable.name().to_string(), variable.dims.clone()),
+        };
+        let kept: Vec<(String, usize)> = dims.into_iter().zip(variable.lengths.iter().copied()).collect();
         let kept = kept.into_iter().filter(|(dim, _)| self.chosen(dim).is_none() && !dim.is_empty());
         let dimensions = kept.collect::<Vec<_>>().iter().map(|(dim, length)| self.dimension(dim, *length)).collect();
         let dimensions: Vec<u32> = match values {
@@ -164,13 +206,18 @@ impl Builder<'_> {
             _ => dimensions,
         };
         let attributes = self.file.described(&variable.path).into_iter().filter(is_users).collect();
-        self.found.variables.push(Described { name: variable.name().into(), dimensions, values, attributes });
+        self.found.variables.push(Described { name, dimensions, values, attributes });
     }
 }
 
 /// How many values an array has.
 fn count(variable: &Variable) -> usize {
     variable.lengths.iter().fold(1, |count: usize, length| count.saturating_mul(*length))
+}
+
+/// Bytes of the numbers of an array.
+fn stored_bytes(variable: &Variable) -> usize {
+    count(variable).saturating_mul(variable.sample.as_ref().map_or(1, |ty| ty.size()))
 }
 
 fn held_bytes(values: &Values) -> usize {

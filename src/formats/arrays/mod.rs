@@ -10,15 +10,18 @@ mod variable;
 pub(crate) mod hdf5_storage;
 pub(crate) mod opener;
 pub(crate) mod axes;
+mod steps;
 mod choose;
 mod chunks;
 pub(crate) mod describe;
 #[cfg_attr(not(feature = "netcdf"), allow(dead_code, reason = "classic NetCDF alone says where numbers are"))]
 pub(crate) mod in_place;
+mod auxiliary_times;
 mod sibling_times;
 mod places;
 mod openpmd;
 mod values;
+mod minc;
 mod vtkhdf;
 mod resolve;
 mod archive;

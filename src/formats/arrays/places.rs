@@ -1,5 +1,6 @@
 //! Where voxels and frames are, by the coordinates of a variable's axes.
 
+use super::auxiliary_times::{self, Auxiliary};
 use super::sibling_times::StepArrays;
 use super::{ArrayFile, FileArrays, Variable, axes, coordinates};
 use wavesplat_core::base::description::AxisRole;
@@ -60,9 +61,7 @@ impl Places {
         for (number, axis) in axes.iter().enumerate() {
             match (axis.role, axis.role.voxels(), variable.coordinate(number, arrays.all)) {
                 (AxisRole::Frames, _, Some(times)) => places.take_times(arrays.file, times),
-                (AxisRole::Frames, _, None) => {
-                    places.take_sibling_times(arrays, &StepArrays::along(variable, number));
-                }
+                (AxisRole::Frames, _, None) => places.take_times_beside(arrays, variable, number),
                 (_, Some(along), Some(coordinate)) => lines[along] = places.line(arrays.file, coordinate),
                 _ => {}
             }
@@ -98,6 +97,16 @@ impl Places {
         }
         self.time_unit = times.text("units").map(String::from);
         self.calendar = times.text("calendar").map(String::from);
+    }
+
+    /// Takes the times of an axis that has no coordinates: those of an auxiliary coordinate, or stored beside frames.
+    fn take_times_beside<'a>(&mut self, arrays: FileArrays<'a>, variable: &'a Variable, axis: usize) {
+        match auxiliary_times::find(arrays, variable, axis) {
+            Ok(Some(Auxiliary::Numbers(times))) => self.take_times(arrays.file, times),
+            Ok(Some(Auxiliary::Dates(dates))) => (self.times, self.time_unit) = (dates.times, Some(dates.unit)),
+            Ok(None) => self.take_sibling_times(arrays, &StepArrays::along(variable, axis)),
+            Err(note) => self.notes.push(note),
+        }
     }
 
     /// Takes the times that are stored beside frames, if there are any.

@@ -48,11 +48,14 @@ impl Context<'_> {
     /// Finds out what an array is.
     pub(crate) fn resolve(&self, variable: &Variable) -> Advised<ResolvedArray> {
         let FileArrays { file, all } = self.arrays;
-        let mesh = openpmd::Mesh::read(file, variable);
+        let (mesh, unfit) = match openpmd::Mesh::read(file, variable) {
+            Ok(mesh) => (mesh, None),
+            Err(note) => (None, Some(note)),
+        };
         let variable = mesh.as_ref().map_or_else(|| variable.clone(), |mesh| mesh.named(variable));
         let sample = variable.sample.clone().map_err(|ty| {
             let path = variable.shown();
-            format!("{path} is of type {ty}, which is not supported; integers and floats are")
+            format!("{path}: {ty} is not supported; arrays of integers and floats in the file itself are")
         })?;
         if variable.lengths.contains(&0) {
             return Err(format!("{} has no samples: its axes are {:?}", variable.shown(), variable.lengths).into());
@@ -65,14 +68,15 @@ impl Context<'_> {
         let layout = Layout(axes.iter().filter(|axis| axis.role != AxisRole::Single).copied().collect());
         layout.bytes(sample.size())?;
         if let Some(mesh) = mesh {
-            (places.spacing, places.origin) = mesh.lattice();
+            (places.spacing, places.origin) = mesh.lattice(&axes);
             places.space_unit = Some("m".into());
-            places.notes.clear();
+            places.notes = mesh.note().into_iter().collect();
         }
+        places.notes.extend(unfit);
         let order = self.take_image(&variable, &layout, &mut places)?;
         let name = match self.index {
-            Some(index) => format!("{}[{index}]", variable.name()),
-            None => variable.name().to_string(),
+            Some(index) => format!("{}[{index}]", own_name(&variable)),
+            None => own_name(&variable),
         };
         let values = Values::from_attributes(&variable, sample)?;
         let description = self.described(&variable, &axes, &values, &mut places);
@@ -102,6 +106,14 @@ impl Context<'_> {
         }
         image.offsets(self.arrays.file, variable, layout.len(AxisRole::Frames))
     }
+}
+
+/// The name of a variable; with that of its group if an axis has the same name, as a component of a vector may.
+fn own_name(variable: &Variable) -> String {
+    let (path, name) = (variable.shown(), variable.name());
+    let group = path[..path.len() - name.len()].trim_end_matches('/').rsplit('/').next().unwrap_or_default();
+    let is_axis = variable.dims.iter().any(|dim| dim == name);
+    if is_axis && !group.is_empty() { format!("{group}_{name}") } else { name.into() }
 }
 
 impl ResolvedArray {

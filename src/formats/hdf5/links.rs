@@ -25,7 +25,8 @@ const SOFT: u32 = 2;
 /// An undefined address of 8 bytes or fewer ends in these.
 const UNDEFINED: u64 = u64::MAX;
 
-/// All links of a group: in the order of their creation if the group keeps it, as other programs list them.
+/// All links of a group: in the order of their creation if the group keeps it, or of their names, as other programs list
+/// them.
 pub(super) fn links(group: &Group) -> Result<Vec<LinkMessage>> {
     let (offset, length) = (group.offset_size(), group.length_size());
     let (storage, most) = (group.storage(), DEFAULT_MAX_OBJECT_HEADER_BYTES);
@@ -41,8 +42,9 @@ pub(super) fn links(group: &Group) -> Result<Vec<LinkMessage>> {
             _ => {}
         }
     }
-    if found.iter().all(|link| link.creation_order.is_some()) {
-        found.sort_by_key(|link| link.creation_order);
+    match found.iter().all(|link| link.creation_order.is_some()) {
+        true => found.sort_by_key(|link| link.creation_order),
+        false => found.sort_by(|a, b| a.name.cmp(&b.name)),
     }
     Ok(found)
 }

@@ -5,6 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from . import hdf5_kinds
 from .case import FRAMES, NAME, ORIGIN, SPACING, STEP, TIMES, UNITS, Case, Refused, axes, by, frame, frames
 
 FOLDER = "hdf5"
@@ -53,6 +54,7 @@ def write(folder: Path) -> list:
         openpmd(folder),
         series(folder),
         missing_chunk(folder),
+        *hdf5_kinds.write(folder),
         *refused(folder),
     ]
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 
+from . import netcdf_kinds
 from .case import DIMS, FRAMES, MISSING, NAME, ORIGIN, SPACING, TIMES, UNITS, Case, Refused, axes, by, frames, without
 from .netcdf_daily import daily
 from .netcdf_xarray import era5
@@ -38,6 +39,7 @@ def write(folder: Path) -> list:
         series(folder),
         *daily(folder),
         era5(folder),
+        *netcdf_kinds.write(folder),
         *refused(folder),
     ]
 

@@ -107,6 +107,7 @@ def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
         return {**samples, **_coordinates(file, set(samples))}, {}
     others = dict(_kept(file, described))
     samples = _samples(file, set(others))
+    others = {name: variable for name, variable in others.items() if name not in samples}
     return {**samples, **others, **_coordinates(file, {*samples, *others})}, attributes(described["global"])
 
 
