@@ -181,7 +181,8 @@ impl SampleFormat {
         let Writer { label: Some(name), has_times, has_coordinates, .. } = self.0 else { return Vec::new() };
         let Encoding { from, to, .. } = self.encoding(contents);
         let retyped = (from != to).then(|| format!("{name} has no {from}: the samples are written as {to}, exactly"));
-        let untimed = !has_times && !contents.numbered && contents.times.len() > 1 && contents.regular_times().is_none();
+        let untimed =
+            !has_times && !contents.numbered && contents.times.len() > 1 && contents.regular_times().is_none();
         let untimed = untimed
             .then(|| format!("{name} can store only times at regular steps: the times of these frames are left out"));
         let irregular = contents.irregular_axes();

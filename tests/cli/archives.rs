@@ -184,3 +184,55 @@ fn a_pipe_carries_a_coefficient_file_unchanged() {
     let early = work.shell("$WAVESPLAT extract a.wspl -o - --format nc | head -c 100 | wc -c").ok();
     assert_eq!((early.text().trim(), early.err.as_str()), ("100", ""));
 }
+
+#[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
+fn what_is_not_read_is_named() {
+    let work = Work::new();
+    let refused = |name: &str, words: &[&str]| drop(work.wavesplat(&format!("info {}", input(name))).fails(2, words));
+    refused("hdf5/links_alone.h5", &["far: a link to /deep/v in other.h5", "all: a virtual dataset"]);
+    refused("hdf5/links_alone.h5 --variable all", &["all: a virtual dataset is not supported"]);
+    refused("hdf5/refused_above_most.h5", &["damaged", "[4, 3, 9, 7]"]);
+    refused("hdf5/refused_minc2.h5", &["MINC", "mnc2nii"]);
+    refused("netcdf/refused_minc1.nc", &["MINC", "mnc2nii"]);
+    refused("hdf5/openpmd --variable data/0/fields/E/x", &["run_000050.h5", "data/%T/fields/E/x"]);
+    let told = work.wavesplat(&format!("info {}", input("hdf5/openpmd"))).ok().out;
+    assert!(String::from_utf8(told).unwrap().contains("data/%T/fields/E/y: f32"), "a file for each iteration");
+    for name in ["hdf5/links.h5", "hdf5/links_earliest.h5"] {
+        let told = work.wavesplat(&format!("info {}", input(name))).ok().out;
+        let told = String::from_utf8(told).unwrap();
+        for words in ["far is not read", "soft is not read", "all is not read: it is a virtual dataset"] {
+            assert!(told.contains(words), "{words} in {told}");
+        }
+    }
+    let told = work.wavesplat(&format!("info {}", input("netcdf/two_times.nc"))).ok().out;
+    assert!(String::from_utf8(told).unwrap().contains("first and second give different times"));
+}
+
+#[test]
+#[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
+fn names_and_coordinates_of_arrays_come_back() {
+    let work = Work::new();
+    let variables = |source: &str, more: &str| {
+        work.wavesplat(&format!("convert {} {more} -o a.wspl --tolerance 0 --force -q", input(source))).ok();
+        work.wavesplat("extract a.wspl -o a.nc --force").ok();
+        let header = work.read("a.nc");
+        move |name: &str| {
+            let mut named = (name.len() as u32).to_be_bytes().to_vec(); // its length, then its text
+            named.extend(name.as_bytes());
+            header.windows(named.len()).filter(|bytes| *bytes == named).count()
+        }
+    };
+    let found = variables("netcdf/coordinates.nc", "");
+    assert!(["valid", "z_rho", "zeta", "density"].iter().all(|name| found(name) == 1));
+    let found = variables("hdf5/openpmd", "--variable E/x");
+    assert_eq!((found("E_x"), found("x"), found("y")), (1, 3, 3), "dimensions, coordinates and their long names");
+    for source in ["netcdf/named_as_axis.nc", "netcdf/named_as_axis_4.nc"] {
+        let found = variables(source, "--variable z");
+        assert_eq!((found("values_z"), found("z")), (1, 1), "{source}");
+    }
+    let found = variables("hdf5/dedalus.h5", "");
+    assert!(["t", "z", "y", "x"].iter().all(|name| found(name) == 2));
+    let found = variables("netcdf/wrf_xtime.nc", "");
+    assert_eq!((found("XTIME"), found("Time")), (1, 1));
+}

@@ -1,6 +1,9 @@
-"""xarray and VTK read what `wavesplat extract` wrote into this folder, and find what is in p.npy and u.npy."""
+"""xarray, VTK, ITK, pynrrd and nibabel read what `wavesplat extract` wrote into this folder, and find what is in p.npy and u.npy."""
 
+import nibabel
+import nrrd
 import numpy
+import SimpleITK
 import xarray
 import xml.etree.ElementTree
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -55,5 +58,26 @@ def check_with_vtk():
     check_image(reader.GetOutput(), expected[0])
 
 
+def check_with_itk():
+    """Frames in one file: with times at regular steps, and with times that nobody gave."""
+    image = SimpleITK.ReadImage("q.nrrd")
+    assert (SimpleITK.GetArrayFromImage(image) == expected).all()
+    assert image.GetSpacing() == (*SPACING, 0.5) and image.GetOrigin() == (*ORIGIN, TIMES[0])
+    for name in ("u.nrrd", "u.nhdr", "u.nii"):
+        assert (SimpleITK.GetArrayFromImage(SimpleITK.ReadImage(name)) == numpy.load("u.npy")).all(), name
+
+
+def check_with_pynrrd_and_nibabel():
+    samples, header = nrrd.read("q.nrrd", index_order="C")
+    assert (samples == expected).all()
+    assert header["space dimension"] == 4 and header["space directions"][3, 3] == 0.5
+    assert header["space origin"].tolist() == [*ORIGIN, TIMES[0]]
+    samples, header = nrrd.read("u.nrrd", index_order="C")
+    assert (samples == numpy.load("u.npy")).all() and numpy.isnan(header["space directions"][3]).all()
+    assert nibabel.load("u.nii").header["pixdim"][4] == 0, "a step that nobody gave"
+
+
 check_with_xarray()
 check_with_vtk()
+check_with_itk()
+check_with_pynrrd_and_nibabel()

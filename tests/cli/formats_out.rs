@@ -201,6 +201,10 @@ fn other_programs_read_the_same() {
     work.write("u.npy", npy("|u1", "3, 2, 4, 5", &bytes));
     work.wavesplat("convert u.npy -o u.wspl --tolerance 0").ok();
     work.wavesplat("extract u.wspl -o u.nc").ok();
+    work.wavesplat(&format!("extract a.wspl {PART} -o q.nrrd")).ok();
+    for name in ["u.nrrd", "u.nhdr", "u.nii"] {
+        work.wavesplat(&format!("extract u.wspl -o {name}")).ok();
+    }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/formats_out.py");
     let output = Command::new(python).arg(script).current_dir(work.path("")).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -128,7 +128,8 @@ fn largest_along_time(all: &Description) -> Option<usize> {
         Values::Texts(texts) => texts.len(),
         Values::Times(_) => 0,
     };
-    let is_along = |at: &usize| all.variables[*at].dimensions.len() > 1 && all.variables[*at].dimensions.contains(&time);
+    let is_along =
+        |at: &usize| all.variables[*at].dimensions.len() > 1 && all.variables[*at].dimensions.contains(&time);
     (0..all.variables.len()).filter(is_along).max_by_key(|at| count(&all.variables[*at]))
 }
 

@@ -162,7 +162,10 @@ impl Series {
         };
         self.archive.description = Some(all);
         for name in lost {
-            note_once(&mut self.archive.notes, format!("{name} is not kept: not every file has it in the same form, or it is too large"));
+            note_once(
+                &mut self.archive.notes,
+                format!("{name} is not kept: not every file has it in the same form, or it is too large"),
+            );
         }
     }
 

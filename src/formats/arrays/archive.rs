@@ -1,6 +1,6 @@
 //! One variable of a file of arrays as frames.
 
-use super::choose;
+use super::choose::{self, Wanted};
 use super::chunks::Chunks;
 use super::opener::{OpenFile, Opener};
 use super::places::Places;
@@ -63,7 +63,13 @@ impl ArrayArchive {
     /// The variables among which the user must choose; none if it is clear which one is meant.
     pub(crate) fn undecided(&self) -> Result<Vec<wavesplat_core::source::VariableInfo>> {
         let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
-        Ok(choose::undecided(&all, active(image.as_ref())))
+        Ok(choose::undecided(&all, &self.wanted(image.as_ref())))
+    }
+
+    /// What the file says of its arrays.
+    fn wanted<'a>(&self, image: Option<&'a vtkhdf::Image>) -> Wanted<'a> {
+        let active = image.and_then(|image| image.active.as_deref());
+        Wanted { active, has_one_step: openpmd::has_one_step(self.file.as_ref()) }
     }
 
     /// Describes the frames of the chosen variable.
@@ -73,7 +79,7 @@ impl ArrayArchive {
         let (all, image) = self.variables().map_err(refused)?;
         let (choice, index) = match options.variable.as_deref() {
             Some(name) => choose::named(&all, name).map_err(Note::from),
-            None => choose::only(&all, active(image.as_ref())).map(|choice| (choice, None)),
+            None => choose::only(&all, &self.wanted(image.as_ref())).map(|choice| (choice, None)),
         }
         .map_err(|e| Error::input(path, e))?;
         if !options.allow_gaps {
@@ -135,11 +141,6 @@ fn take_times(described: &mut FileHeader, arrays: FileArrays<'_>, choice: &Choic
         described.units.calendar = places.calendar;
     }
     described.notes.extend(places.notes);
-}
-
-/// The name of the active array of an image.
-fn active(image: Option<&vtkhdf::Image>) -> Option<&str> {
-    image.and_then(|image| image.active.as_deref())
 }
 
 /// One archive of the arrays of all steps.

@@ -5,8 +5,8 @@ use wavesplat_core::base::description::{AxisRole, NumberType, Values};
 use wavesplat_core::base::error::Note;
 use wavesplat_core::base::time_labels::seconds_since;
 
-/// Names of arrays of dates, in lower case.
-const DATES: [&str; 4] = ["times", "time", "dates", "date"];
+/// Values of an array of texts that may be dates.
+const MOST_TEXTS: usize = 1 << 24;
 
 /// Times that were found.
 pub(super) enum Auxiliary<'a> {
@@ -34,12 +34,14 @@ pub(super) fn find<'a>(
 ) -> Result<Option<Auxiliary<'a>>, Note> {
     let dim = variable.dims[axis].as_str();
     let is_along = |v: &&Variable| v.dims.first().is_some_and(|d| d == dim) && v.lengths[0] == variable.lengths[axis];
-    let along: Vec<_> = arrays.all.iter().filter(|v| !dim.is_empty() && v.path != variable.path && is_along(v)).collect();
+    let along: Vec<_> =
+        arrays.all.iter().filter(|v| !dim.is_empty() && v.path != variable.path && is_along(v)).collect();
     let times: Vec<_> = along.iter().copied().filter(|v| v.lengths.len() == 1 && is_time(v)).collect();
     let named = variable.text("coordinates").unwrap_or_default();
     let is_named = |v: &&Variable| named.split_whitespace().any(|name| name == v.name());
     let is_standard = |v: &&Variable| v.text("standard_name") == Some("time");
-    let tiers = [times.iter().copied().filter(is_named).collect(), times.iter().copied().filter(is_standard).collect(), times];
+    let tiers =
+        [times.iter().copied().filter(is_named).collect(), times.iter().copied().filter(is_standard).collect(), times];
     match tiers.into_iter().find(|tier: &Vec<&Variable>| !tier.is_empty()) {
         Some(tier) => the_same(arrays, &tier).map(|times| Some(Auxiliary::Numbers(times))),
         None => Ok(along.into_iter().find_map(|v| dates(arrays, v)).map(Auxiliary::Dates)),
@@ -64,10 +66,11 @@ fn the_same<'a>(arrays: FileArrays<'a>, found: &[&'a Variable]) -> Result<&'a Va
     }
 }
 
-/// Dates of an array of texts, as WRF writes them.
+/// Dates of an array of texts, as WRF and MPAS write them.
 fn dates(arrays: FileArrays<'_>, variable: &Variable) -> Option<Dates> {
+    let count = variable.lengths.iter().fold(1, |count: usize, length| count.saturating_mul(*length));
     let is_text = matches!(&variable.sample, Err(kind) if kind == "text") && variable.lengths.len() <= 2;
-    if !is_text || !DATES.contains(&variable.name().to_lowercase().as_str()) {
+    if !is_text || count > MOST_TEXTS {
         return None;
     }
     let texts = match arrays.file.values(&variable.path).ok()? {

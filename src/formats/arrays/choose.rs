@@ -8,6 +8,15 @@ use wavesplat_core::base::error::{Note, Remedy};
 use wavesplat_core::source::variables::{self, VariableAxis};
 use wavesplat_core::source::{self, Advised, Parsed};
 
+/// What a file says of its arrays.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Wanted<'a> {
+    /// The name of the array that is meant.
+    pub(crate) active: Option<&'a str>,
+    /// Whether it has one step of several, which are in files of their own.
+    pub(crate) has_one_step: bool,
+}
+
 impl Choice<'_> {
     /// Whether a name is that of its array, or the end of its path.
     fn ends_with(&self, name: &str) -> bool {
@@ -70,9 +79,9 @@ fn not_found(all: &[Variable], name: &str) -> String {
     format!("has no variable {name}{other}; it has{}", listed(&grouped(all.iter())))
 }
 
-/// The one variable that can be an archive, or of several the one that is `active`.
-pub(crate) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Advised<Choice<'a>> {
-    let mut volumes = volumes(all, active);
+/// The one variable that can be an archive, or of several the one that is wanted.
+pub(crate) fn only<'a>(all: &'a [Variable], wanted: &Wanted<'_>) -> Advised<Choice<'a>> {
+    let mut volumes = volumes(all, wanted);
     match volumes.len() {
         1 => Ok(volumes.remove(0)),
         0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&grouped(all.iter()))).into()),
@@ -81,13 +90,13 @@ pub(crate) fn only<'a>(all: &'a [Variable], active: Option<&str>) -> Advised<Cho
 }
 
 /// The variables among which the user must choose; none if [`only`] finds the one.
-pub(crate) fn undecided(all: &[Variable], active: Option<&str>) -> Vec<source::VariableInfo> {
-    let volumes = volumes(all, active);
+pub(crate) fn undecided(all: &[Variable], wanted: &Wanted<'_>) -> Vec<source::VariableInfo> {
+    let volumes = volumes(all, wanted);
     if volumes.len() > 1 { volumes.iter().map(Choice::info).collect() } else { Vec::new() }
 }
 
-/// The variables that can be an archive, or of several the one that is `active`.
-fn volumes<'a>(all: &'a [Variable], active: Option<&str>) -> Vec<Choice<'a>> {
+/// The variables that can be an archive, or of several the one that is wanted.
+fn volumes<'a>(all: &'a [Variable], wanted: &Wanted<'_>) -> Vec<Choice<'a>> {
     let bounds = bounds(all);
     let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
     let of_width = |is_64_bit: bool| {
@@ -98,7 +107,10 @@ fn volumes<'a>(all: &'a [Variable], active: Option<&str>) -> Vec<Choice<'a>> {
     if volumes.is_empty() {
         volumes = of_width(true); // numbers of cells, say, where there is nothing else
     }
-    match volumes.iter().position(|c| c.is_active(active)) {
+    if wanted.has_one_step {
+        volumes = volumes.into_iter().map(Choice::numbered).collect();
+    }
+    match volumes.iter().position(|c| c.is_active(wanted.active)) {
         Some(at) => vec![volumes.swap_remove(at)],
         None => volumes,
     }

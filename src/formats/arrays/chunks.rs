@@ -215,7 +215,15 @@ mod tests {
     fn every_sample_is_read_once_and_put_in_its_place() {
         let (dims, attributes) = (vec![String::new(); 5], Attributes::new());
         let (lengths, chunk) = (LENGTHS.to_vec(), Some(CHUNK.to_vec()));
-        let variable = Variable { path: "a".into(), sample: Ok(StoredType::U16), lengths, dims, scales: Vec::new(), chunk, attributes };
+        let variable = Variable {
+            path: "a".into(),
+            sample: Ok(StoredType::U16),
+            lengths,
+            dims,
+            scales: Vec::new(),
+            chunk,
+            attributes,
+        };
         let [t, _, z, y, x] = LENGTHS;
         let voxels = [Axis::new(AxisRole::Z, z), Axis::new(AxisRole::Y, y), Axis::new(AxisRole::X, x)];
         let axes = [vec![Axis::new(AxisRole::Frames, t), Axis::single(1, 2)], voxels.to_vec()].concat();

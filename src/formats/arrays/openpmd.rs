@@ -89,6 +89,11 @@ impl Mesh {
     }
 }
 
+/// Whether a file has one iteration, because each has a file of its own.
+pub(crate) fn has_one_step(file: &dyn ArrayFile) -> bool {
+    matches!(file.group("/").get("iterationEncoding"), Some(Attribute::Text(how)) if how == "fileBased")
+}
+
 /// The time of each step, and whether times are in seconds, if the groups of all steps state it. The step of a single
 /// array is a numbered group that it is in.
 pub(crate) fn times(file: &dyn ArrayFile, choice: &Choice<'_>) -> Option<(Vec<f64>, bool)> {

@@ -25,6 +25,16 @@ impl<'a> Choice<'a> {
         Self { path: array.shown().into(), arrays: vec![array], steps: Vec::new() }
     }
 
+    /// A single array as one step, if its path has a number: those in other files differ in the first one.
+    pub(super) fn numbered(self) -> Self {
+        let part = numbered(&self.path).first().copied().filter(|_| self.steps.is_empty());
+        let step = part.and_then(|part| Some((part, number(&self.path, part)?)));
+        match step {
+            Some((part, step)) => Self { path: template(&self.path, &[part]), steps: vec![step], ..self },
+            None => self,
+        }
+    }
+
     fn of_steps(path: String, mut arrays: Vec<(u64, &'a Variable)>) -> Self {
         arrays.sort_by_key(|(step, _)| *step);
         let (steps, arrays) = arrays.into_iter().unzip();
@@ -187,7 +197,8 @@ mod tests {
     fn of_several_numbers_that_of_time_counts_steps() {
         let imaris = |t: usize, level: usize| format!("DataSet/ResolutionLevel {level}/TimePoint {t}/Channel 0/Data");
         let paths = [imaris(0, 0), imaris(1, 0), imaris(0, 1), imaris(1, 1)];
-        let expected = [0, 1].map(|level| format!("DataSet/ResolutionLevel {level}/TimePoint %T/Channel 0/Data [0, 1]"));
+        let expected =
+            [0, 1].map(|level| format!("DataSet/ResolutionLevel {level}/TimePoint %T/Channel 0/Data [0, 1]"));
         assert_eq!(found(&paths.each_ref().map(String::as_str)), expected);
         assert_eq!(found(&["t0/s0/c", "t0/s1/c", "t1/s0/c"]), ["t%T/s0/c [0, 1]", "t0/s1/c []"]);
         assert_eq!(found(&["a0/b0/v", "a0/b1/v", "a1/b0/v"]).len(), 3, "nothing says which is time");

@@ -1,8 +1,8 @@
 //! The arrays of an HDF5 file, and the names in it that lead elsewhere.
 
+use super::attributes::described_all;
 use super::links::{elsewhere, is_absent, links};
 use super::numbers::stored_type;
-use super::read::described_all;
 use super::scales::Scales;
 use crate::arrays::hdf5_storage::{check_lengths, reason};
 use crate::arrays::{Variable, attributes};

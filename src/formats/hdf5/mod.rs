@@ -1,15 +1,17 @@
 //! HDF5, and in it VTKHDF and openPMD. A file that the NetCDF library wrote is a NetCDF file, whatever its name is.
 
 #[cfg(feature = "hdf5")]
+mod numbers;
+#[cfg(feature = "hdf5")]
+mod attributes;
+#[cfg(feature = "hdf5")]
 mod links;
+#[cfg(feature = "hdf5")]
+mod scales;
 #[cfg(feature = "hdf5")]
 mod listing;
 #[cfg(feature = "hdf5")]
-mod numbers;
-#[cfg(feature = "hdf5")]
 mod read;
-#[cfg(feature = "hdf5")]
-mod scales;
 
 use super::format::{Format, Reader};
 

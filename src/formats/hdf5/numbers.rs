@@ -6,6 +6,31 @@ use wavesplat_core::base::description::NumberType;
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::Parsed;
 
+/// Runs an expression for numbers of a size in bytes.
+macro_rules! sized {
+    ($size:expr, |$n:ident| $run:expr) => {
+        match $size {
+            1 => {
+                const $n: usize = 1;
+                $run
+            }
+            2 => {
+                const $n: usize = 2;
+                $run
+            }
+            4 => {
+                const $n: usize = 4;
+                $run
+            }
+            _ => {
+                const $n: usize = 8;
+                $run
+            }
+        }
+    };
+}
+pub(super) use sized;
+
 pub(super) fn number_type(ty: &Datatype) -> Parsed<NumberType> {
     stored_type(ty)?.number().ok_or_else(|| format!("{} is not kept", kind(ty)))
 }
@@ -61,8 +86,7 @@ const FLOATS: u8 = 1;
 const ENUMS: u8 = 8;
 
 /// Places and lengths of exponent and mantissa, and the bias, of floats of IEEE 754: after their bytes.
-const IEEE: [(u32, [u8; 4], u32); 3] =
-    [(2, [10, 5, 0, 10], 15), (4, [23, 8, 0, 23], 127), (8, [52, 11, 0, 52], 1023)];
+const IEEE: [(u32, [u8; 4], u32); 3] = [(2, [10, 5, 0, 10], 15), (4, [23, 8, 0, 23], 127), (8, [52, 11, 0, 52], 1023)];
 
 /// An error for numbers that fill their bytes in another way than usual: other floats than those of IEEE 754, or
 /// integers of some of the bits.
@@ -72,7 +96,8 @@ pub(super) fn check_form(dataset: &Dataset) -> Parsed<()> {
     if !is_number || dataset.raw_datatype().map_err(|e| e.to_string())?.as_slice().is_usual() {
         return Ok(());
     }
-    Err("its numbers have a form of their own, which is not read: no floats of IEEE 754, or integers of some bits".into())
+    Err("its numbers have a form of their own, which is not read: no floats of IEEE 754, or integers of some bits"
+        .into())
 }
 
 /// The description of a type, as it is stored.

@@ -1,7 +1,8 @@
 //! HDF5 files as [`ArrayFile`].
 
+use super::attributes::described_all;
 use super::listing::Listed;
-use super::numbers::{StoredBytes, check_form, joined, number_type};
+use super::numbers::{StoredBytes, check_form, joined, number_type, sized};
 use crate::arrays::describe::numbers;
 use crate::arrays::hdf5_storage::{check_lengths, reason, storage};
 use crate::arrays::opener::ReadConfig;
@@ -40,30 +41,6 @@ fn open_file(path: &Path, how: ReadConfig) -> Result<Box<dyn ArrayFile>> {
 fn options(how: ReadConfig) -> hdf5_reader::OpenOptions {
     // Every chunk is read once, so none is kept.
     hdf5_reader::OpenOptions::default().with_chunk_cache_bytes(0).with_max_chunk_bytes(how.memory)
-}
-
-/// Runs an expression for numbers of a size in bytes.
-macro_rules! sized {
-    ($size:expr, |$n:ident| $run:expr) => {
-        match $size {
-            1 => {
-                const $n: usize = 1;
-                $run
-            }
-            2 => {
-                const $n: usize = 2;
-                $run
-            }
-            4 => {
-                const $n: usize = 4;
-                $run
-            }
-            _ => {
-                const $n: usize = 8;
-                $run
-            }
-        }
-    };
 }
 
 struct Hdf5ArrayFile {
@@ -130,24 +107,6 @@ impl ArrayFile for Hdf5ArrayFile {
         let group = self.file.group(path).and_then(|group| group.attributes());
         group.map(|all| attributes(&described_all(&all))).unwrap_or_default()
     }
-}
-
-/// The attributes of an object; those of types that users define are left out.
-pub(super) fn described_all(all: &[hdf5_reader::Attribute]) -> Vec<description::Attribute> {
-    let one = |a: &hdf5_reader::Attribute| Some(description::Attribute { name: a.name.clone(), value: described(a)? });
-    all.iter().filter_map(one).collect()
-}
-
-/// An attribute's value with its type; None of types that users define.
-fn described(attribute: &hdf5_reader::Attribute) -> Option<description::Values> {
-    let Ok(ty) = number_type(&attribute.datatype) else {
-        return attribute.read_strings().ok().map(description::Values::Texts);
-    };
-    Some(sized!(ty.size(), |N| {
-        let all = attribute.read_1d::<StoredBytes<N>>();
-        let all = all.or_else(|_| attribute.read_scalar::<StoredBytes<N>>().map(|number| vec![number])).ok()?;
-        numbers(ty, &joined(all))
-    }))
 }
 
 /// All numbers of an array, as they are stored, but with the least significant byte first.

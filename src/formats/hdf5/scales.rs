@@ -47,13 +47,7 @@ impl Scales {
     }
 
     /// The scale of an axis: of several, that with times, or the first. One as long as the axis is preferred.
-    fn of_axis<'a>(
-        &self,
-        of: &Variable,
-        axis: usize,
-        scales: &[u64],
-        all: &'a [Variable],
-    ) -> Option<&'a Variable> {
+    fn of_axis<'a>(&self, of: &Variable, axis: usize, scales: &[u64], all: &'a [Variable]) -> Option<&'a Variable> {
         let found = scales.iter().filter_map(|address| all.get(*self.arrays.get(address)?));
         let found: Vec<_> = found.filter(|scale| has_coordinates(scale)).collect();
         let fits = |scale: &&&Variable| scale.lengths == [of.lengths[axis]];

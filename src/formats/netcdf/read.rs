@@ -84,7 +84,8 @@ impl ArrayFile for NetCdfArrayFile {
     }
 
     fn numbers(&self, path: &str) -> Parsed<Vec<f64>> {
-        let numbers = self.file.read_variable_as_f64(&self.stored(path)).map_err(|e| format!("{path}: {}", reason(&e)))?;
+        let numbers =
+            self.file.read_variable_as_f64(&self.stored(path)).map_err(|e| format!("{path}: {}", reason(&e)))?;
         Ok(numbers.into_iter().collect())
     }
 
@@ -99,7 +100,11 @@ impl ArrayFile for NetCdfArrayFile {
     fn values(&self, path: &str) -> Parsed<description::Values> {
         let variable = self.found(path)?;
         if *variable.dtype() == NcType::String {
-            return self.file.read_variable_as_strings(&self.stored(path)).map(description::Values::Texts).map_err(|e| reason(&e));
+            return self
+                .file
+                .read_variable_as_strings(&self.stored(path))
+                .map(description::Values::Texts)
+                .map_err(|e| reason(&e));
         }
         let bytes = match variable.dtype() {
             NcType::Char => self.file.read_variable_raw_bytes(&self.stored(path)).map_err(|e| reason(&e))?,

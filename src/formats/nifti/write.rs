@@ -181,6 +181,7 @@ fn units(contents: &Contents) -> u8 {
 mod tests {
     use super::*;
     use crate::contents::testing::contents;
+    use wavesplat_core::base::description::{Attribute, Description, NumberType, Numbers};
 
     fn written(contents: &Contents) -> NiftiBytes<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -203,5 +204,22 @@ mod tests {
         long.grid.dims[0] = LONGEST_OF_FIRST + 1;
         let header = written(&long);
         assert_eq!((header.bytes.len(), header.real(400, 3)), (SECOND, -1.0));
+    }
+    #[test]
+    fn one_frame_keeps_the_fourth_axis_and_irregular_frames_have_no_step() {
+        let of_source = |frames: i16| {
+            let mut source = written(&contents());
+            source.put(48, frames.to_le_bytes());
+            let value = Values::Numbers(Numbers::new(NumberType::U8, &source.bytes));
+            let global = vec![Attribute { name: NIFTI_HEADER.into(), value }];
+            Contents { description: Some(Description { global, ..Description::default() }), ..contents() }
+        };
+        let axes = |frames| {
+            let one = Contents { frames: vec![2], times: vec![0.25], ..of_source(frames) };
+            i16::from_le_bytes(written(&one).get(40))
+        };
+        assert_eq!((axes(1), axes(3)), (4, 3));
+        let irregular = Contents { times: vec![0.25, 0.5, 7.0], ..of_source(3) };
+        assert_eq!(written(&irregular).real(76, 4), 0.0);
     }
 }

@@ -201,7 +201,15 @@ fn add(
 /// An array that cannot be read, and why.
 fn unread(path: &str, why: String) -> Variable {
     let (lengths, dims) = (Vec::new(), Vec::new());
-    Variable { path: path.into(), sample: Err(why), lengths, dims, scales: Vec::new(), chunk: None, attributes: Attributes::new() }
+    Variable {
+        path: path.into(),
+        sample: Err(why),
+        lengths,
+        dims,
+        scales: Vec::new(),
+        chunk: None,
+        attributes: Attributes::new(),
+    }
 }
 
 fn variable(array: &Array<FilesystemStore>) -> Variable {

@@ -54,6 +54,29 @@ def test_the_bytes_of_the_program(tmp_path):
     assert (tmp_path / "a.wspl").read_bytes() == (tmp_path / "c.wspl").read_bytes()
 
 
+def test_coordinates_over_any_axes_are_kept(tmp_path):
+    ds = xr.Dataset({"v": (("time", "z", "y", "x"), smooth((8, 5, 6, 7)))})
+    hours = np.datetime64("2001-01-01", "ns") + np.arange(8)[:, None] * np.timedelta64(24, "h")
+    ds = ds.assign_coords(
+        valid_time=(("time", "z"), hours + np.arange(5) * np.timedelta64(1, "h")),
+        z_rho=(("z", "y", "x"), smooth((1, 5, 6, 7))[0]),
+        zeta=(("time", "y", "x"), smooth((8, 1, 6, 7))[:, 0]),
+    )
+    ds.to_wavesplat(tmp_path / "a.wspl")
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    xr.testing.assert_identical(back.drop_vars("v"), ds.drop_vars("v"))
+    run("extract", tmp_path / "a.wspl", "-o", tmp_path / "a.nc")
+    assert {"valid_time", "z_rho", "zeta"} <= set(xr.open_dataset(tmp_path / "a.nc").coords)
+
+
+def test_samples_named_as_an_axis_leave_its_coordinates(tmp_path):
+    z = xr.DataArray(smooth((8, 5, 6, 7)), dims=("t", "z", "y", "x"), coords={"t": np.arange(8.0)}, name="z")
+    z.to_wavesplat(tmp_path / "a.wspl")
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    assert list(back.data_vars) == ["values_z"] and back.values_z.dims == z.dims
+    assert (back.t == z.t).all()
+
+
 @pytest.fixture
 def opened(tmp_path):
     ocean().to_wavesplat(tmp_path / "a.wspl", tolerance=0, window=4, block=8)
