@@ -189,7 +189,7 @@ fn a_pipe_carries_a_coefficient_file_unchanged() {
 #[cfg_attr(not(feature = "netcdf"), ignore = "needs the feature netcdf")]
 fn what_is_not_read_is_named() {
     let work = Work::new();
-    let refused = |name: &str, words: &[&str]| drop(work.wavesplat(&format!("info {}", input(name))).fails(2, words));
+    let refused = |name: &str, words: &[&str]| drop(work.wavesplat(&format!("info {}", input(name))).fails(3, words));
     refused("hdf5/links_alone.h5", &["far: a link to /deep/v in other.h5", "all: a virtual dataset"]);
     refused("hdf5/links_alone.h5 --variable all", &["all: a virtual dataset is not supported"]);
     refused("hdf5/refused_above_most.h5", &["damaged", "[4, 3, 9, 7]"]);

@@ -95,11 +95,7 @@ impl ArrayArchive {
             parts.push(self.part(found, state)?);
         }
         let mut described = joined(found, parts).map_err(refused)?;
-        let frames: usize = described.parts.iter().map(|part| part.frames).sum();
-        let has_none = choice.arrays.len() > 1 || described.times.is_empty() && frames == 1;
-        if let Some((times, are_seconds)) = openpmd::times(self.file.as_ref(), &choice).filter(|_| has_none) {
-            (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
-        }
+        take_times_of_groups(&mut described, self.file.as_ref(), &choice);
         if choice.arrays.len() > 1 {
             take_times(&mut described, arrays, &choice);
             described.notes.push(format!("frames are the {} arrays {}", choice.arrays.len(), choice.path).into());
@@ -126,6 +122,15 @@ fn on_elsewhere(mut all: Vec<String>) -> Vec<String> {
     all.truncate(MOST_NOTES);
     all.extend((more > 0).then(|| format!("{more} more names lead to what is not read")));
     all
+}
+
+/// Uses the times that the groups of the steps state, for steps or for a single frame that has no time.
+fn take_times_of_groups(described: &mut FileHeader, file: &dyn ArrayFile, choice: &Choice<'_>) {
+    let frames: usize = described.parts.iter().map(|part| part.frames).sum();
+    let has_none = choice.arrays.len() > 1 || described.times.is_empty() && frames == 1;
+    if let Some((times, are_seconds)) = openpmd::times(file, choice).filter(|_| has_none) {
+        (described.times, described.units.times) = (times, are_seconds.then(|| "s".into()));
+    }
 }
 
 /// Uses the times stored beside the arrays, if the steps have no times of their own.

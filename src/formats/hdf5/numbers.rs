@@ -1,7 +1,7 @@
 //! The types of numbers in HDF5, and their bytes.
 
 use hdf5_reader::error::Error as Hdf5Error;
-use hdf5_reader::{ByteOrder, Dataset, Datatype, EnumMember, H5Type, dtype_element_size};
+use hdf5_reader::{ByteOrder, Dataset, Datatype, EnumMember, H5Type};
 use wavesplat_core::base::description::NumberType;
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::Parsed;
@@ -48,7 +48,11 @@ pub(super) fn stored_type(ty: &Datatype) -> Parsed<StoredType> {
         Datatype::FloatingPoint { size: 2, .. } => StoredType::F16,
         Datatype::FloatingPoint { size: 4, .. } => StoredType::F32,
         Datatype::FloatingPoint { size: 8, .. } => StoredType::F64,
-        Datatype::Enum { ref base, ref members } if is_bool(members) && dtype_bytes(base) == 1 => StoredType::U8,
+        Datatype::Enum { ref base, ref members }
+            if is_bool(members) && matches!(**base, Datatype::FixedPoint { size: 1, .. }) =>
+        {
+            StoredType::U8
+        }
         Datatype::Enum { ref base, .. } => stored_type(base)?,
         Datatype::Bitfield { size: 1, .. } => StoredType::U8,
         Datatype::Bitfield { size: 2, .. } => StoredType::U16,
@@ -73,11 +77,7 @@ fn is_bool(members: &[EnumMember]) -> bool {
     names == ["FALSE", "TRUE"]
 }
 
-fn dtype_bytes(ty: &Datatype) -> usize {
-    dtype_element_size(ty).unwrap_or_default()
-}
-
-/// Bytes of a description of a type before its properties.
+/// Bytes of the description of a type before its properties.
 const PROPERTIES: usize = 8;
 
 /// Classes of types in their descriptions.
@@ -85,45 +85,35 @@ const INTEGERS: u8 = 0;
 const FLOATS: u8 = 1;
 const ENUMS: u8 = 8;
 
-/// Places and lengths of exponent and mantissa, and the bias, of floats of IEEE 754: after their bytes.
-const IEEE: [(u32, [u8; 4], u32); 3] = [(2, [10, 5, 0, 10], 15), (4, [23, 8, 0, 23], 127), (8, [52, 11, 0, 52], 1023)];
+/// The properties of floats of IEEE 754 after their number of bits: places and lengths of exponent and mantissa, and the
+/// bias.
+const IEEE: [&[u8]; 3] = [&[10, 5, 0, 10, 15, 0, 0, 0], &[23, 8, 0, 23, 127, 0, 0, 0], &[52, 11, 0, 52, 0xff, 3, 0, 0]];
+
+/// The flag of floats in the order of bytes of a VAX.
+const VAX: u8 = 0x40;
 
 /// An error for numbers that fill their bytes in another way than usual: other floats than those of IEEE 754, or
 /// integers of some of the bits.
 pub(super) fn check_form(dataset: &Dataset) -> Parsed<()> {
     let is_number =
         matches!(dataset.dtype(), Datatype::FixedPoint { .. } | Datatype::FloatingPoint { .. } | Datatype::Enum { .. });
-    if !is_number || dataset.raw_datatype().map_err(|e| e.to_string())?.as_slice().is_usual() {
+    if !is_number || is_usual(&dataset.raw_datatype().map_err(|e| e.to_string())?) {
         return Ok(());
     }
-    Err("its numbers have a form of their own, which is not read: no floats of IEEE 754, or integers of some bits"
-        .into())
+    Err("its numbers are neither floats of IEEE 754 nor integers of whole bytes, and are not read".into())
 }
 
-/// The description of a type, as it is stored.
-trait StoredDescription {
-    fn is_usual(&self) -> bool;
-}
-
-impl StoredDescription for [u8] {
-    fn is_usual(&self) -> bool {
-        let Some((head, rest)) = self.split_first_chunk::<PROPERTIES>() else { return false };
-        let size = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
-        let number = |at: usize| rest.get(at..at + 2).map(|two| u16::from_le_bytes([two[0], two[1]]));
-        let is_whole = number(0) == Some(0) && number(2).map(u32::from) == size.checked_mul(8);
-        match head[0] & 0x0f {
-            INTEGERS => is_whole,
-            FLOATS => {
-                let is_vax = head[1] & 0x40 != 0;
-                let bias = rest.get(8..12).and_then(|four| four.first_chunk()).map(|four| u32::from_le_bytes(*four));
-                let is_ieee = |known: &&(u32, [u8; 4], u32)| {
-                    known.0 == size && rest.get(4..8) == Some(&known.1[..]) && bias == Some(known.2)
-                };
-                is_whole && !is_vax && IEEE.iter().any(|known| is_ieee(&known))
-            }
-            ENUMS => rest.is_usual(),
-            _ => true,
-        }
+/// Whether the stored description of a type says that its numbers fill their bytes as usual.
+fn is_usual(description: &[u8]) -> bool {
+    let Some((head, properties)) = description.split_first_chunk::<PROPERTIES>() else { return false };
+    let [class, flags, _, _, size @ ..] = *head;
+    let bits = u32::from_le_bytes(size).wrapping_mul(8).to_le_bytes();
+    let is_whole = properties.starts_with(&[0, 0, bits[0], bits[1]]);
+    match class & 0x0f {
+        INTEGERS => is_whole,
+        FLOATS => is_whole && flags & VAX == 0 && properties.get(4..12).is_some_and(|rest| IEEE.contains(&rest)),
+        ENUMS => is_usual(properties),
+        _ => true,
     }
 }
 

@@ -73,7 +73,8 @@ def test_samples_named_as_an_axis_leave_its_coordinates(tmp_path):
     z = xr.DataArray(smooth((8, 5, 6, 7)), dims=("t", "z", "y", "x"), coords={"t": np.arange(8.0)}, name="z")
     z.to_wavesplat(tmp_path / "a.wspl")
     back = xr.open_dataset(tmp_path / "a.wspl")
-    assert list(back.data_vars) == ["values_z"] and back.values_z.dims == z.dims
+    assert list(back.data_vars) == ["values_z"]
+    assert back.values_z.dims == z.dims
     assert (back.t == z.t).all()
 
 
