@@ -4,7 +4,7 @@ use crate::block::{BlockId, BlockStats, PartKind, PartStats};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::file_id::FileId;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
-use crate::section::{FRAME, SectionId, read};
+use crate::section::{FRAME, SectionId, read, read_checked};
 use crate::{Result, Storage};
 
 /// Bytes of a block's entry without its part entries.
@@ -141,11 +141,14 @@ impl PartEntry {
     /// Reads its stored bytes and checks their checksum.
     pub(crate) fn read(&self, storage: &impl Storage, file: FileId, block: BlockId) -> Result<Vec<u8>> {
         let section = SectionId::Part(block, self.kind);
-        let stored = read(storage, section, self.offset, self.stored_len.into())?;
-        if section.checksum(file, &stored) != self.checksum {
-            return Err(section.corrupt(self.offset, "the checksum does not match"));
-        }
-        Ok(stored)
+        let range = self.offset..self.offset.saturating_add(self.stored_len.into());
+        read_checked(storage, std::slice::from_ref(&range), || {
+            let stored = read(storage, section, self.offset, self.stored_len.into())?;
+            match section.checksum(file, &stored) == self.checksum {
+                true => Ok(stored),
+                false => Err(section.corrupt(self.offset, "the checksum does not match")),
+            }
+        })
     }
 
     fn encode(&self, out: &mut Vec<u8>) {

@@ -14,7 +14,7 @@ use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_ROOT_RAW, align};
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
-use crate::section::{FRAME, SectionId, decompress, read_section};
+use crate::section::{FRAME, SectionId, decompress, read_checked, read_section};
 use crate::{Error, Result, Storage};
 
 /// An open file. Every method takes `&self`; threads can share it if the storage is `Sync`.
@@ -40,8 +40,7 @@ impl<S: Storage> Reader<S> {
     /// [`Error::Foreign`], [`Error::Unsupported`] or [`Error::Corrupt`] if the file is not valid, [`Error::Io`] if the
     /// storage fails.
     pub fn open(storage: S) -> Result<Self> {
-        let header = read_header(&storage)?;
-        let footer = read_footer(&storage, header.id)?;
+        let (header, footer) = read_ends(&storage)?;
         storage.fetch(std::slice::from_ref(&(footer.metadata.offset..footer.total)))?;
         let metadata = read_metadata(&storage, &footer)?;
         let features = header.features();
@@ -340,6 +339,16 @@ fn unpacked<T>(
 
 fn no_block(id: BlockId) -> Error {
     Error::Invalid(format!("{id}: the archive has no such block"))
+}
+
+/// Reads the header and the footer.
+fn read_ends(storage: &impl Storage) -> Result<(Header, Footer)> {
+    let ends = [0..HEADER as u64, storage.len().saturating_sub(FOOTER as u64)..storage.len()];
+    read_checked(storage, &ends, || {
+        let header = read_header(storage)?;
+        let footer = read_footer(storage, header.id)?;
+        Ok((header, footer))
+    })
 }
 
 pub(crate) fn read_header(storage: &impl Storage) -> Result<Header> {

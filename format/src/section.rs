@@ -6,6 +6,7 @@ use crate::file_id::FileId;
 use crate::{Error, Result, Storage};
 use std::cell::RefCell;
 use std::fmt;
+use std::ops::Range;
 use xxhash_rust::xxh3::{xxh3_64, xxh3_64_with_seed};
 use zstd::zstd_safe;
 
@@ -145,8 +146,29 @@ pub(crate) fn read(storage: &impl Storage, section: SectionId, offset: u64, len:
     Ok(out)
 }
 
+/// Reads and checks something in these ranges. If it is wrong, and the storage kept it, reads it from its source once more:
+/// bytes may have changed on their way.
+pub(crate) fn read_checked<T>(
+    storage: &impl Storage,
+    ranges: &[Range<u64>],
+    read: impl Fn() -> Result<T>,
+) -> Result<T> {
+    let is_inside = || ranges.iter().all(|range| range.end <= storage.len());
+    read().or_else(|wrong| if !wrong.is_io() && is_inside() && storage.forget(ranges) { read() } else { Err(wrong) })
+}
+
 /// Reads the stored bytes of a section; checks its frame and checksum.
 pub(crate) fn read_section(
+    storage: &impl Storage,
+    file: FileId,
+    section: SectionId,
+    extent: &SectionExtent,
+) -> Result<Vec<u8>> {
+    let range = extent.offset..extent.end();
+    read_checked(storage, std::slice::from_ref(&range), || read_section_once(storage, file, section, extent))
+}
+
+fn read_section_once(
     storage: &impl Storage,
     file: FileId,
     section: SectionId,

@@ -42,6 +42,12 @@ pub trait Storage {
         Ok(())
     }
 
+    /// Drops what it keeps of these ranges, since they fail a check, so that they are read from their source again. Returns
+    /// whether other bytes may come then. By default nothing is kept, and the answer is false.
+    fn forget(&self, _ranges: &[Range<u64>]) -> bool {
+        false
+    }
+
     /// Whether every request is slow, however few bytes it asks for: true for remote storages. Then calling
     /// [`Self::fetch`] saves time, and bytes that were read should be kept.
     fn is_remote(&self) -> bool {
@@ -90,6 +96,10 @@ macro_rules! behind {
 
             fn fetch(&self, ranges: &[Range<u64>]) -> io::Result<()> {
                 S::fetch(self, ranges)
+            }
+
+            fn forget(&self, ranges: &[Range<u64>]) -> bool {
+                S::forget(self, ranges)
             }
 
             fn is_remote(&self) -> bool {

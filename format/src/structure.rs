@@ -4,9 +4,9 @@
 use crate::directory::BlockEntry;
 use crate::header::HEADER;
 use crate::leaf::LeafEntry;
-use crate::limits::{ALIGN, align};
+use crate::limits::align;
 use crate::reader::Reader;
-use crate::section::{FRAME, SectionExtent, SectionId, frame, read};
+use crate::section::{FRAME, SectionExtent, SectionId, frame, read, read_checked};
 use crate::{Error, Result, Storage};
 use std::ops::Range;
 
@@ -99,23 +99,28 @@ impl<S: Storage> Reader<S> {
         let (len, checksum) = (content.len() as u32, section.checksum(self.id(), content));
         let extent = SectionExtent { offset, stored_len: len, raw_len: len, checksum };
         let expected = [&frame(section, &extent), content].concat();
-        if read(self.storage(), section, offset, expected.len() as u64)? != expected {
-            return Err(section.corrupt(offset, "differs from metadata and directory"));
-        }
-        Ok(extent.end())
+        let range = offset..extent.end();
+        read_checked(self.storage(), std::slice::from_ref(&range), || {
+            match read(self.storage(), section, offset, expected.len() as u64)? == expected {
+                true => Ok(extent.end()),
+                false => Err(section.corrupt(offset, "differs from metadata and directory")),
+            }
+        })
     }
 }
 
-/// Checks that the bytes from `from` to the next multiple of [`ALIGN`] are zero.
+/// Checks that the bytes from `from` to the next multiple of 64 are zero.
 pub(crate) fn check_padding(storage: &impl Storage, from: u64) -> Result<()> {
     let corrupt = |what: &str| Error::Corrupt { offset: from, place: "padding".into(), what: what.into() };
-    let mut padding = [0; ALIGN as usize];
-    let padding = &mut padding[..(align(from) - from) as usize];
     if align(from) > storage.len() {
         return Err(corrupt("truncated"));
     }
-    storage.read_at(from, padding)?;
-    if padding.iter().all(|&byte| byte == 0) { Ok(()) } else { Err(corrupt("not zero")) }
+    let range = from..align(from);
+    read_checked(storage, std::slice::from_ref(&range), || {
+        let mut padding = vec![0; (range.end - from) as usize];
+        storage.read_at(from, &mut padding)?;
+        if padding.iter().all(|&byte| byte == 0) { Ok(()) } else { Err(corrupt("not zero")) }
+    })
 }
 
 /// Passes errors of the file to `found`; returns an error only if the storage failed.

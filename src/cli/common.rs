@@ -45,6 +45,9 @@ pub struct CommonArgs {
 impl CommonArgs {
     /// Starts the worker threads. Call once.
     pub fn start(&self) -> Result<()> {
+        if self.quiet {
+            messages::silence();
+        }
         let threads = self.threads.map_or(0, NonZeroUsize::get);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
         pool.map_err(|e| Error::usage(format!("--threads {threads}: {e}")))

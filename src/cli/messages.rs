@@ -3,6 +3,7 @@
 use clap::Command;
 use std::borrow::Cow;
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use wavesplat_core::base::error::{Error, Note, Remedy};
 use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::is_field;
@@ -26,6 +27,21 @@ pub(super) fn picture_text(text: &str) -> String {
 /// Prints a line on standard error.
 pub(super) fn note(text: impl std::fmt::Display) {
     let _ = writeln!(io::stderr().lock(), "{text}"); // a failure cannot be reported anywhere else
+}
+
+/// Whether notes about servers are left out.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Leaves out notes about servers from now on.
+pub(super) fn silence() {
+    QUIET.store(true, Relaxed);
+}
+
+/// A note about a server, unless they are left out.
+pub(super) fn remote_note(text: &str) {
+    if !QUIET.load(Relaxed) {
+        note(text);
+    }
 }
 
 /// The text of a note, with advice if it has a remedy.
@@ -111,6 +127,10 @@ pub fn advice(remedy: &Remedy) -> Cow<'static, str> {
         Remedy::AppendOrBeginAnew { frames } => return append(*frames).into(),
         Remedy::RecoverOrSkip => {
             "wavesplat recover saves the undamaged blocks; if only blocks are damaged, --skip-damaged reads the rest"
+        }
+        Remedy::DownloadOrSkip => {
+            "the server was asked twice; if a downloaded copy is damaged, too, wavesplat recover saves its undamaged blocks; \
+             --skip-damaged reads them from here"
         }
         Remedy::ResumeOrRecover => {
             "an unfinished conversion: its command with --resume continues it, wavesplat recover saves its finished blocks"

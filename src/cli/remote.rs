@@ -1,6 +1,6 @@
 //! Options for remote files.
 
-use super::Size;
+use super::{Size, messages};
 use clap::Args;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,8 @@ pub struct RemoteArgs {
     /// Largest size of the cache; the least recently used data are removed first
     #[arg(long, value_name = "SIZE", default_value = "4GiB", help_heading = "Remote files")]
     cache_size: Size,
-    /// How long a server may stay silent before a request is retried; a request is sent at most five times
+    /// How long a server may stay silent before a request is retried, and the longest pause that it may ask for; a request is
+    /// sent at most five times
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds, help_heading = "Remote files")]
     timeout: f64,
 }
@@ -60,7 +61,7 @@ impl RemoteArgs {
     /// How remote files are read.
     pub(super) fn options(&self) -> Result<RemoteOptions> {
         let cache = self.cache.as_ref().map(|folder| Cache::new(folder, self.cache_size.0 as u64)).transpose()?;
-        Ok(RemoteOptions { cache, timeout: Duration::from_secs_f64(self.timeout) })
+        Ok(RemoteOptions { cache, timeout: Duration::from_secs_f64(self.timeout), note: messages::remote_note })
     }
 }
 

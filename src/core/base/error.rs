@@ -196,7 +196,9 @@ impl Error {
 /// What helps against damage of a coefficient file.
 fn damage_remedy(path: &Path, damage: &wavesplat_format::Error) -> Option<Remedy> {
     let unfinished = path.extension().is_some_and(|ending| ending == "part");
+    let is_remote = path.to_string_lossy().contains("://");
     match damage {
+        wavesplat_format::Error::Corrupt { .. } if is_remote => Some(Remedy::DownloadOrSkip),
         wavesplat_format::Error::Corrupt { .. } if unfinished => Some(Remedy::ResumeOrRecover),
         wavesplat_format::Error::Corrupt { .. } | wavesplat_format::Error::Lost(_) => Some(Remedy::RecoverOrSkip),
         _ => None,

@@ -11,6 +11,10 @@ pub mod memory;
 pub mod vectors;
 pub mod zeroed;
 #[doc(hidden)]
+pub mod files;
+#[doc(hidden)]
+pub mod temporary;
+#[doc(hidden)]
 pub mod text;
 pub(crate) mod half;
 mod calendar;

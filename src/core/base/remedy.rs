@@ -64,6 +64,8 @@ pub enum Remedy {
     },
     /// Recover the undamaged blocks of a file, or read it without the damaged ones.
     RecoverOrSkip,
+    /// A server gave wrong bytes twice: recover a downloaded copy, or read it without the damaged blocks.
+    DownloadOrSkip,
     /// Resume the conversion that left this unfinished file, or recover its blocks.
     ResumeOrRecover,
     /// Give a range above 0, or take the linear norm.

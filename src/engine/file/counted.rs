@@ -44,6 +44,10 @@ impl Storage for Counted {
         self.storage.fetch(ranges)
     }
 
+    fn forget(&self, ranges: &[Range<u64>]) -> bool {
+        self.storage.forget(ranges)
+    }
+
     fn is_remote(&self) -> bool {
         self.storage.is_remote()
     }

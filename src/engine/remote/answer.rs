@@ -2,7 +2,7 @@
 
 use std::io;
 use std::ops::Range;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use ureq::http::HeaderMap;
 use ureq::http::header::{CONTENT_ENCODING, CONTENT_RANGE, ETAG, LAST_MODIFIED, RETRY_AFTER};
 use wavesplat_core::base::error::ChangedSince;
@@ -134,13 +134,37 @@ fn refusal(status: u16, headers: &HeaderMap) -> Failure {
         }
         416 => "the file is empty (416)",
         408 | 425 | 429 | 500 | 502 | 503 | 504 => {
-            let wait = headers.get(RETRY_AFTER).and_then(|wait| wait.to_str().ok()?.trim().parse().ok());
+            let wait = headers.get(RETRY_AFTER).and_then(|wait| pause(wait.to_str().ok()?.trim()));
             let what = format!("the server cannot answer now ({status})");
-            return Failure::Temporary(io::Error::other(what), wait.map(Duration::from_secs));
+            return Failure::Temporary(io::Error::other(what), wait);
         }
         _ => &format!("the server does not send it ({status})"),
     };
     Failure::Refused(io::Error::other(what))
+}
+
+/// The pause that `Retry-After` asks for: seconds, or until a time; none if that has passed.
+fn pause(text: &str) -> Option<Duration> {
+    if !text.is_empty() && text.bytes().all(|digit| digit.is_ascii_digit()) {
+        return Some(Duration::from_secs(text.parse().unwrap_or(u64::MAX)));
+    }
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).ok()?.as_secs();
+    date(text)?.checked_sub(now).filter(|seconds| *seconds > 0).map(Duration::from_secs)
+}
+
+/// The seconds from 1970 to a time like `Fri, 31 Dec 1999 23:59:59 GMT`.
+fn date(text: &str) -> Option<u64> {
+    const MONTHS: [&str; 12] = ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
+    let words: Vec<&str> = text.strip_suffix(" GMT")?.split([' ', ':']).collect();
+    let [_, day, month, year, hour, minute, second] = words[..] else { return None };
+    let month = MONTHS.iter().position(|name| *name == month)? as u64 + 1;
+    let number = |text: &str, most: u64| text.parse::<u64>().ok().filter(|number| *number <= most);
+    let (day, year) = (number(day, 31)?, number(year, 9999).filter(|year| *year >= 1970)?);
+    let (hour, minute, second) = (number(hour, 23)?, number(minute, 59)?, number(second, 60)?);
+    // Years begin in March here, so that leap days come last.
+    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    let days = 365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day - 1;
+    Some(((days.checked_sub(719_468)? * 24 + hour) * 60 + minute) * 60 + second)
 }
 
 #[cfg(test)]
@@ -223,5 +247,22 @@ mod tests {
         let busy = |wait| check(503, &headers(&[("Retry-After", wait)]), &(0..9), None);
         assert!(matches!(busy("7"), Err(Failure::Temporary(_, Some(wait))) if wait.as_secs() == 7));
         assert!(matches!(busy("Fri, 31 Dec 1999 23:59:59 GMT"), Err(Failure::Temporary(_, None))));
+        let far = |wait| matches!(busy(wait), Err(Failure::Temporary(_, Some(wait))) if wait.as_secs() > 1 << 30);
+        assert!(far("Fri, 31 Dec 9999 23:59:59 GMT") && far("99999999999999999999"));
+        for nonsense in ["", "-1", "1.5", "soon", "Fri, 31 Foo 9999 23:59:59 GMT", "Fri, 31 Dec 9999 GMT"] {
+            assert!(matches!(busy(nonsense), Err(Failure::Temporary(_, None))), "{nonsense}");
+        }
+    }
+
+    #[test]
+    fn dates_are_seconds_since_1970() {
+        for (text, seconds) in [
+            ("Thu, 01 Jan 1970 00:00:00 GMT", 0),
+            ("Sun, 06 Nov 1994 08:49:37 GMT", 784_111_777),
+            ("Tue, 29 Feb 2000 12:00:00 GMT", 951_825_600),
+            ("Tue, 01 Mar 2033 00:00:01 GMT", 1_993_248_001),
+        ] {
+            assert_eq!(date(text), Some(seconds), "{text}");
+        }
     }
 }

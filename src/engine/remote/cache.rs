@@ -17,8 +17,14 @@ use xxhash_rust::xxh3::{xxh3_64_with_seed, xxh3_128};
 /// Folders of the cache begin with this: nothing else in it is ever touched.
 const PREFIX: &str = "wavesplat-";
 
+/// Hexadecimal digits of the name of such a folder.
+const DIGITS: usize = 32;
+
 /// The ending of pages.
 const ENDING: &str = "page";
+
+/// Names of pages that are being written begin with this; 6 letters follow.
+const UNFINISHED: &str = ".new";
 
 /// A page used again within this time keeps its recorded time of use.
 const RECENT: Duration = Duration::from_secs(60);
@@ -90,12 +96,12 @@ impl Cache {
         }
     }
 
-    /// All pages, also unfinished ones: when they were used, their sizes and paths.
+    /// All pages, also unfinished ones: when they were used, their sizes and paths. Links are not followed, and names that
+    /// the cache does not give are not its own.
     fn pages(&self) -> impl Iterator<Item = (SystemTime, u64, PathBuf)> {
-        let is_own = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PREFIX));
-        let objects = entries(&self.folder).filter(move |path| is_own(path));
+        let objects = entries(&self.folder).filter(|path| is_object(path) && is_real_folder(path));
         objects.flat_map(|object| entries(&object)).filter_map(|path| {
-            let about = path.metadata().ok().filter(|_| path.extension().is_some_and(|ending| ending == ENDING))?;
+            let about = path.symlink_metadata().ok().filter(|about| about.is_file() && is_page(&path))?;
             Some((about.modified().ok()?, about.len(), path))
         })
     }
@@ -104,6 +110,26 @@ impl Cache {
 /// The paths in a folder; none if it cannot be read.
 fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+/// Whether a path is a folder, and no link to one.
+fn is_real_folder(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|about| about.is_dir())
+}
+
+/// Whether the folder of an object has this name.
+fn is_object(path: &Path) -> bool {
+    let digest = path.file_name().and_then(|name| name.to_str()?.strip_prefix(PREFIX));
+    digest.is_some_and(|digest| digest.len() == DIGITS && digest.bytes().all(|digit| digit.is_ascii_hexdigit()))
+}
+
+/// Whether a page has this name, or an unfinished one.
+fn is_page(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()?.strip_suffix(ENDING)?.strip_suffix('.'));
+    name.is_some_and(|name| match name.strip_prefix(UNFINISHED) {
+        Some(random) => random.len() == 6 && random.bytes().all(|letter| letter.is_ascii_alphanumeric()),
+        None => name.len() >= 10 && name.bytes().all(|digit| digit.is_ascii_digit()),
+    })
 }
 
 /// The pages of one object.
@@ -126,8 +152,10 @@ impl CachedObject {
 
     /// A page of this length; none if it is not kept, or damaged.
     pub(super) fn load(&self, page: u64, length: usize) -> Option<Vec<u8>> {
-        let file = File::open(self.path(page)).ok()?;
-        let about = file.metadata().ok().filter(|about| about.len() <= PAGE + 8)?;
+        let path = self.path(page);
+        path.symlink_metadata().ok().filter(|about| about.is_file() && about.len() <= PAGE + 8)?; // no link, no pipe
+        let file = File::open(path).ok()?;
+        let about = file.metadata().ok()?;
         let mut bytes = Vec::with_capacity(PAGE as usize + 8);
         std::io::Read::read_to_end(&mut std::io::Read::take(&file, PAGE + 9), &mut bytes).ok()?;
         let checksum = bytes.split_off(bytes.len().checked_sub(8)?);
@@ -139,11 +167,23 @@ impl CachedObject {
         is_whole.then_some(bytes)
     }
 
+    /// Removes a page, if it is kept.
+    pub(super) fn remove(&self, page: u64) {
+        if is_real_folder(&self.folder) {
+            let _ = fs::remove_file(self.path(page)); // most were not kept
+        }
+    }
+
     /// Keeps a page, if that can be done.
     pub(super) fn store(&self, page: u64, bytes: &[u8]) {
         let write = || {
             fs::create_dir_all(&self.folder)?;
-            let mut file = tempfile::Builder::new().suffix(&format!(".{ENDING}")).tempfile_in(&self.folder)?;
+            if !is_real_folder(&self.folder) {
+                return Err(std::io::ErrorKind::NotADirectory.into()); // a link: what is behind it is not the cache's
+            }
+            let ending = format!(".{ENDING}");
+            let mut file =
+                tempfile::Builder::new().prefix(UNFINISHED).rand_bytes(6).suffix(&ending).tempfile_in(&self.folder)?;
             file.write_all(bytes)?;
             file.write_all(&self.checksum(page, bytes))?;
             file.persist(self.path(page)).map_err(|failed| failed.error)
@@ -221,6 +261,58 @@ mod tests {
         Cache::new(folder.path(), most).expect("a folder");
         assert!((1..=most).contains(&kept(folder.path())), "{}", kept(folder.path()));
         assert!(other.join("0000000000.page").exists());
+    }
+
+    #[test]
+    fn links_are_not_followed_and_files_of_others_stay() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [kept, mine] = ["kept", "mine"].map(|name| folder.path().join(name));
+        let object = Cache::new(&kept, 1 << 30).expect("a folder").object(Path::new("a"), b"", "", 1 << 20);
+        object.store(1, &[7; 30_000]);
+        let [linked, named] = ["0".repeat(32), "f".repeat(32)].map(|name| kept.join(format!("{PREFIX}{name}")));
+        fs::create_dir(&mine).expect("writable");
+        std::os::unix::fs::symlink(&mine, &linked).expect("a link");
+        fs::create_dir_all(&named).expect("writable");
+        let others = [
+            mine.join("0000000000.page"),
+            named.join("notes.page"),
+            named.join("12.page"),
+            kept.join("wavesplat-mine/0000000000.page"),
+        ];
+        fs::create_dir(kept.join("wavesplat-mine")).expect("writable");
+        for path in &others {
+            fs::write(path, vec![0; 100_000]).expect("writable");
+            File::options().write(true).open(path).expect("a file").set_modified(SystemTime::UNIX_EPOCH).expect("old");
+        }
+        let outside = mine.join("outside.page");
+        fs::write(&outside, vec![0; 100_000]).expect("writable");
+        std::os::unix::fs::symlink(&outside, named.join("0000000009.page")).expect("a link");
+        Cache::new(&kept, 1000).expect("a folder");
+        assert!(others.iter().chain([&outside]).all(|path| path.exists()), "only the cache's own pages go");
+        assert_eq!(object.load(1, 30_000), None, "it went");
+    }
+
+    #[test]
+    fn only_files_are_read_and_written_as_pages() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let object = Cache::new(folder.path(), 1 << 30).expect("a folder").object(Path::new("a"), b"", "", 1 << 20);
+        object.store(1, &[7; 1000]);
+        object.store(2, &[8; 1000]);
+        let [one, two, moved] = [object.path(1), object.path(2), folder.path().join("moved")];
+        fs::rename(&one, &moved).expect("writable");
+        std::os::unix::fs::symlink(&moved, &one).expect("a link");
+        fs::remove_file(&two).expect("writable");
+        assert!(std::process::Command::new("mkfifo").arg(&two).status().expect("mkfifo").success());
+        assert_eq!((object.load(1, 1000), object.load(2, 1000)), (None, None));
+        object.store(2, &[8; 1000]);
+        object.store(1, &[9; 1000]);
+        assert_eq!((object.load(1, 1000), object.load(2, 1000)), (Some(vec![9; 1000]), Some(vec![8; 1000])));
+        assert_eq!(fs::read(&moved).expect("a file")[0], 7, "the link went, and not what it led to");
+        fs::rename(&object.folder, &moved.with_extension("d")).expect("writable");
+        std::os::unix::fs::symlink(moved.with_extension("d"), &object.folder).expect("a link");
+        object.remove(1);
+        object.store(3, &[9; 1000]);
+        assert_eq!(entries(&moved.with_extension("d")).count(), 2, "nothing behind a link changes");
     }
 
     #[test]

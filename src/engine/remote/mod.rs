@@ -15,6 +15,10 @@ mod profile;
 #[cfg(feature = "remote")]
 mod answer;
 #[cfg(feature = "remote")]
+mod redirect;
+#[cfg(feature = "remote")]
+mod retry;
+#[cfg(feature = "remote")]
 mod object;
 
 pub use cache::Cache;
@@ -36,13 +40,15 @@ use wavesplat_format::Storage;
 pub struct RemoteOptions {
     /// The cache folder for later runs.
     pub cache: Option<Cache>,
-    /// How long a server may be silent.
+    /// How long a server may be silent, and how long a pause it may ask for.
     pub timeout: Duration,
+    /// Gets a note when a server asks for a pause.
+    pub note: fn(&str),
 }
 
 impl Default for RemoteOptions {
     fn default() -> Self {
-        Self { cache: None, timeout: Duration::from_secs(30) }
+        Self { cache: None, timeout: Duration::from_secs(30), note: |_| {} }
     }
 }
 

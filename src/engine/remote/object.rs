@@ -2,17 +2,19 @@
 
 use super::address::Address;
 use super::answer::{About, Failure, check};
+use super::redirect::{MOST_REDIRECTS, is_redirect, is_same_server, target};
+use super::retry::Retries;
 use super::{Paged, RemoteOptions};
-use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{self, Read};
 use std::ops::Range;
 use std::panic::resume_unwind;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
-use ureq::config::RedirectAuthHeaders;
+use ureq::http::header::LOCATION;
+use ureq::http::{Response, Uri};
 use ureq::tls::{RootCerts, TlsConfig};
 use ureq::{Agent, Body};
 use wavesplat_core::base::address::public_name;
@@ -25,15 +27,6 @@ const FIRST: u64 = 64 << 10;
 /// Requests that are under way at once.
 const SIDE_BY_SIDE: usize = 8;
 
-/// How often a request is made before it fails.
-const TRIES: u32 = 5;
-
-/// The wait before the second request; it doubles with every further one.
-const FIRST_WAIT: Duration = Duration::from_millis(250);
-
-/// The longest wait that a server may ask for.
-const LONGEST_WAIT: Duration = Duration::from_secs(60);
-
 /// How many times longer than its silence an answer of at most 4 MiB may take.
 const SLOWEST: u32 = 20;
 
@@ -45,7 +38,8 @@ pub(super) fn open(address: &Path, options: &RemoteOptions) -> error::Result<Pag
     let name = public_name(address);
     let of = Address::parse(&address.to_string_lossy()).map_err(|what| Error::path(&name, what))?;
     let doing = of.server().map_or("opening".into(), |server| format!("opening at {server}"));
-    let (object, first) = Object::open(of, options.timeout).map_err(|e| Error::io(&name, doing, e))?;
+    let retries = Retries::new(&name, options);
+    let (object, first) = Object::open(of, options.timeout, retries).map_err(|e| Error::io(&name, doing, e))?;
     let version = options.cache.as_ref().zip(object.about.version());
     let on_disk = version.map(|(cache, version)| cache.object(&name, &first, version, object.about.len));
     Ok(Paged::new(object, on_disk).begun(&first))
@@ -58,6 +52,9 @@ pub(super) struct Object {
     agent: Agent,
     about: About,
     limit: RequestLimit,
+    retries: Retries,
+    /// Whether bytes were wrong, so that none may come from something on the way that keeps them.
+    distrusts: AtomicBool,
 }
 
 /// Limits the number of simultaneous requests, whatever the number of threads that make them.
@@ -84,36 +81,64 @@ impl RequestLimit {
 
 impl Object {
     /// Opens an object, and returns its first bytes with it.
-    fn open(address: Address, timeout: Duration) -> io::Result<(Self, Vec<u8>)> {
+    fn open(address: Address, timeout: Duration, retries: Retries) -> io::Result<(Self, Vec<u8>)> {
         let agent = agent(&address, timeout);
-        let opening = Self { address, agent, about: About::default(), limit: RequestLimit::new(SIDE_BY_SIDE) };
-        let (about, first) = with_retries(|| opening.ask(&(0..FIRST), None))?;
+        let (limit, distrusts) = (RequestLimit::new(SIDE_BY_SIDE), AtomicBool::new(false));
+        let opening = Self { address, agent, about: About::default(), limit, retries, distrusts };
+        let (about, first) = opening.retries.until_answered(|| opening.ask(&(0..FIRST), None))?;
         Ok((Self { about, ..opening }, first))
     }
 
     /// Reads a range within the object.
     fn read(&self, range: &Range<u64>) -> io::Result<Vec<u8>> {
         let ask = || self.limit.take(|| self.ask(range, Some(&self.about)));
-        with_retries(ask).map(|(_, bytes)| bytes)
+        self.retries.until_answered(ask).map(|(_, bytes)| bytes)
     }
 
     /// Requests a range once. `known` is the result of earlier answers, if any.
     fn ask(&self, range: &Range<u64>, known: Option<&About>) -> Result<(About, Vec<u8>), Failure> {
-        let mut request = self.agent.get(self.address.url());
-        request = request.header("Range", format!("bytes={}-{}", range.start, range.end - 1));
-        if let Some(etag) = known.and_then(About::strong_etag) {
-            request = request.header("If-Match", etag);
-        }
-        if let Some(authorization) = self.address.authorization() {
-            request = request.header("Authorization", authorization);
-        }
-        let (head, body) = request.call().map_err(failure)?.into_parts();
+        let (head, body) = self.answer(range, known)?.into_parts();
         let status = head.status.as_u16();
         match check(status, &head.headers, range, known) {
             Ok(about) => body_of(body, range.end.min(about.len) - range.start).map(|bytes| (about, bytes)),
             Err(Failure::Refused(error)) => Err(self.explained(&error, status, body)),
             Err(failure) => Err(failure),
         }
+    }
+
+    /// The answer to a request for a range, wherever redirects lead.
+    fn answer(&self, range: &Range<u64>, known: Option<&About>) -> Result<Response<Body>, Failure> {
+        let first: Uri = self.address.url().parse().map_err(|_| Failure::last("its address is not understood"))?;
+        let mut to = first.clone();
+        for _ in 0..=MOST_REDIRECTS {
+            let authorization = self.address.authorization().filter(|_| is_same_server(&to, &first));
+            let answer = self.send(&to, authorization, range, known)?;
+            if !is_redirect(answer.status().as_u16()) {
+                return Ok(answer);
+            }
+            to = next_address(&to, answer)?;
+        }
+        Err(Failure::last("the server sends elsewhere again and again"))
+    }
+
+    /// Sends a request to one address.
+    fn send(
+        &self,
+        to: &Uri,
+        authorization: Option<&str>,
+        range: &Range<u64>,
+        known: Option<&About>,
+    ) -> Result<Response<Body>, Failure> {
+        let bytes = format!("bytes={}-{}", range.start, range.end - 1);
+        let fresh = self.distrusts.load(Relaxed).then_some("no-cache");
+        let headers = [
+            ("If-Match", known.and_then(About::strong_etag)),
+            ("Authorization", authorization),
+            ("Cache-Control", fresh),
+        ];
+        let request = self.agent.get(to.clone()).header("Range", bytes);
+        let given = headers.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        given.fold(request, |request, (name, value)| request.header(name, value)).call().map_err(failure)
     }
 
     /// A refusal with the server's own words, and what helps.
@@ -145,9 +170,25 @@ impl Storage for Object {
         side_by_side(ranges, |range| self.read(range))
     }
 
+    fn forget(&self, _ranges: &[Range<u64>]) -> bool {
+        self.distrusts.store(true, Relaxed);
+        true
+    }
+
     fn is_remote(&self) -> bool {
         true
     }
+}
+
+/// The address that an answer sends to.
+fn next_address(from: &Uri, answer: Response<Body>) -> Result<Uri, Failure> {
+    let (head, body) = answer.into_parts();
+    let _ = io::copy(&mut body.into_reader().take(MOST_WORDS), &mut io::sink()); // the connection is used again
+    let location = head.headers.get(LOCATION).ok_or_else(|| {
+        Failure::last("the server says that it is elsewhere, but not where; AWS_REGION may not be that of the bucket")
+    })?;
+    let next = location.to_str().ok().and_then(|location| target(from, location));
+    next.ok_or_else(|| Failure::last("the server sends to an address that is not of HTTP, which is not followed"))
 }
 
 /// Reads ranges by several threads; the first error ends it.
@@ -177,37 +218,13 @@ fn side_by_side(
     Ok(all.into_iter().map(|(_, bytes)| bytes).collect())
 }
 
-/// Retries a request until it succeeds, fails for good, or has been tried five times.
-fn with_retries<T>(request: impl Fn() -> Result<T, Failure>) -> io::Result<T> {
-    let mut wait = FIRST_WAIT;
-    for _ in 1..TRIES {
-        match request() {
-            Ok(answer) => return Ok(answer),
-            Err(Failure::Final(error) | Failure::Refused(error)) => return Err(error),
-            Err(Failure::Temporary(_, asked)) => {
-                thread::sleep(asked.map_or(wait, |asked| asked.min(LONGEST_WAIT)).mul_f64(spread()));
-            }
-        }
-        wait *= 2;
-    }
-    request().map_err(|failure| match failure {
-        Failure::Final(error) | Failure::Refused(error) => error,
-        Failure::Temporary(error, _) => io::Error::new(error.kind(), format!("{error}; it was asked {TRIES} times")),
-    })
-}
-
-/// A random factor between 1 and 1.5 for waiting times, so that many clients refused at once do not retry at once.
-fn spread() -> f64 {
-    1.0 + RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64 / 2.0
-}
-
 /// The HTTP client: connections that stay open, proxies from the environment, the certificates of the system.
 fn agent(address: &Address, timeout: Duration) -> Agent {
     let tls = TlsConfig::builder().root_certs(RootCerts::PlatformVerifier).build();
     let config = Agent::config_builder()
         .http_status_as_error(false)
         .https_only(address.is_encrypted())
-        .redirect_auth_headers(RedirectAuthHeaders::SameHost)
+        .max_redirects(0) // followed here: a password is for one server alone
         .tls_config(tls)
         .user_agent(concat!("wavesplat/", env!("CARGO_PKG_VERSION")))
         .accept_encoding("identity")
@@ -241,9 +258,6 @@ fn failure(error: ureq::Error) -> Failure {
             Failure::Temporary(io::Error::new(io::ErrorKind::TimedOut, "the server does not answer in time"), None)
         }
         ureq::Error::HostNotFound => Failure::last("there is no host of this name, or no network"),
-        ureq::Error::TooManyRedirects | ureq::Error::RedirectFailed => {
-            Failure::last("the server sends elsewhere again and again")
-        }
         ureq::Error::RequireHttpsOnly(_) => {
             Failure::last("the server sends to an address that is not encrypted, which is not followed")
         }
@@ -254,9 +268,6 @@ fn failure(error: ureq::Error) -> Failure {
         }
         ureq::Error::Io(error) => Failure::Temporary(error, None),
         ureq::Error::ConnectionFailed => Failure::Temporary(io::Error::other("no connection to the server"), None),
-        other if other.to_string().contains("missing a location") => Failure::last(
-            "the server says that it is elsewhere, but not where; AWS_REGION may not be that of the bucket",
-        ),
         _ => Failure::last("the server's answer is not understood"), // its text may hold a signed address
     }
 }

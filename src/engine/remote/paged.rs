@@ -247,6 +247,16 @@ impl<S: Storage> Storage for Paged<S> {
         self.get(&wanted).map(drop)
     }
 
+    fn forget(&self, ranges: &[Range<u64>]) -> bool {
+        let within = ranges.iter().map(|range| range.start..range.end.min(self.storage.len()));
+        for page in within.flat_map(|range| numbers(&range)) {
+            self.lock().held.remove(&page);
+            self.on_disk.iter().for_each(|disk| disk.remove(page));
+        }
+        self.storage.forget(ranges);
+        true
+    }
+
     fn is_remote(&self) -> bool {
         true
     }
@@ -254,7 +264,9 @@ impl<S: Storage> Storage for Paged<S> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cache::Cache;
     use super::*;
+    use std::path::Path;
     use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
     use std::thread;
     use std::time::Duration;
@@ -383,6 +395,27 @@ mod tests {
         assert_eq!(count.pages, 4);
         count.add(&(0..u64::MAX / 2));
         assert!(count.is_full());
+    }
+
+    #[test]
+    fn wrong_pages_are_read_again_from_the_storage() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let disk = || Cache::new(folder.path(), 1 << 30).expect("a folder").object(Path::new("a"), b"", "", 5 * PAGE);
+        let mut paged = far(5 * PAGE as usize);
+        paged.on_disk = Some(disk());
+        let right = paged.storage.bytes.clone();
+        paged.storage.bytes[3 * PAGE as usize..][..9].fill(0xFF);
+        let read =
+            |paged: &Paged<Far>| paged.read_many(std::slice::from_ref(&(0..5 * PAGE))).expect("within").remove(0);
+        assert!(read(&paged) != right);
+        paged.storage.bytes.clone_from(&right);
+        assert!(read(&paged) != right, "it is kept");
+        asked(&paged);
+        assert!(paged.forget(&[3 * PAGE + 1..3 * PAGE + 5, 5 * PAGE - 1..u64::MAX]));
+        assert!(read(&paged) == right);
+        assert_eq!(asked(&paged), [[3 * PAGE..5 * PAGE]], "only what was wrong");
+        let later = Paged::new(Far { bytes: vec![0; right.len()], ..Far::default() }, Some(disk()));
+        assert!(read(&later) == right, "the disk has the right bytes, too");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use configparser::ini::Ini;
 use std::env;
 use std::path::PathBuf;
+use wavesplat_core::base::files;
 
 /// Credentials, region and endpoint.
 #[derive(Debug, Default, PartialEq, Eq)]
@@ -25,7 +26,7 @@ impl Profile {
     /// A named profile that is not there, files that are not understood, and profiles whose credentials are elsewhere.
     pub(super) fn from_environment() -> Result<Self, String> {
         let variable = |name: &str| env::var(name).ok().filter(|value| !value.trim().is_empty());
-        Self::from_sources(&variable, &|path| std::fs::read_to_string(path).ok())
+        Self::from_sources(&variable, &|path| String::from_utf8(files::read(&path).ok()?).ok())
     }
 
     /// As [`Self::from_environment`], from these variables and files.

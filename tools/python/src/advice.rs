@@ -39,6 +39,9 @@ fn advice(remedy: &Remedy) -> Option<String> {
         Remedy::Replace => "overwrite=True replaces it".into(),
         Remedy::BeginAnew => "overwrite=True starts over".into(),
         Remedy::ResumeOrBeginAnew => "resume=True continues it, overwrite=True starts over".into(),
+        Remedy::DownloadOrSkip => {
+            "the server was asked twice; download the file, and check it: wavesplat verify".into()
+        }
         Remedy::RecoverOrSkip => "the program wavesplat saves the undamaged blocks: wavesplat recover".into(),
         Remedy::ResumeOrRecover => "an unfinished conversion: resume=True continues it".into(),
         _ => return None,
