@@ -9,11 +9,12 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use std::env;
 use std::ffi::OsString;
-use std::fs;
+use std::io::Read;
 use std::ops::Range;
 use std::path::PathBuf;
 use toml::de::{DeTable, DeValue};
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::files;
 
 /// The id of the option that names a file.
 const CONFIG: &str = "config";
@@ -51,7 +52,9 @@ impl Config {
         }
         match given.get_one::<PathBuf>(CONFIG).cloned().or_else(|| from_environment(program)) {
             Some(path) => {
-                let text = fs::read_to_string(&path).map_err(|e| Error::io(&path, "reading", e))?;
+                let mut text = String::new();
+                let read = files::open_or_stream(&path)?.read_to_string(&mut text);
+                read.map_err(|e| Error::io(&path, "reading", e))?;
                 let file = File { path, text: &text, program };
                 let options = file.options(command, given)?;
                 Ok(Self { path: file.path, options })

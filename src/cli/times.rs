@@ -1,11 +1,11 @@
 //! The options of times: those of the user in place of those in the files.
 
 use super::{Numbers, Pair};
-use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::source::{GivenTimes, RegularTimes, Units};
 use wavesplat_engine::file::{CoefficientFile, setting};
 
@@ -68,9 +68,11 @@ const MOST_IN_LINE: u64 = 1 << 12;
 
 /// Reads one number from each line of a file. `#` begins a comment.
 fn read(path: &Path) -> Result<Vec<f64>> {
-    let file = File::open(path).map_err(|e| match e.kind() {
-        ErrorKind::NotFound => Error::path(path, "is neither START,STEP nor a file with a number for each frame"),
-        _ => Error::io(path, "opening", e),
+    let file = files::open_or_stream(path).map_err(|e| match e {
+        Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
+            Error::path(path, "is neither START,STEP nor a file with a number for each frame")
+        }
+        other => other,
     })?;
     let (mut lines, mut line, mut times) = (BufReader::new(file.take(MOST_BYTES)), Vec::new(), Vec::new());
     for number in 1.. {

@@ -2,9 +2,9 @@
 
 use super::format::{Format, Reader};
 use serde::Deserialize;
-use std::fs;
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::source::Parsed;
 use wavesplat_core::source::series::FrameFiles;
 
@@ -23,7 +23,7 @@ struct SeriesEntry {
 
 /// Reads the list; its files are found from its own folder.
 fn read(path: &Path) -> Result<FrameFiles> {
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "reading", e))?;
+    let bytes = files::read(path)?;
     parse(&bytes, path.parent().unwrap_or(Path::new(""))).map_err(|e| Error::input(path, e))
 }
 

@@ -8,6 +8,7 @@
 
 use crate::base::address::refuse_address;
 use crate::base::error::{ChangedSince, Error, Result};
+use crate::base::files;
 use memmap2::{Advice, Mmap, MmapOptions};
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::fs::{File, Metadata};
@@ -94,12 +95,8 @@ impl FileBytes {
     pub fn open(path: &Path, access: Access) -> Result<Self> {
         refuse_address(path)?;
         let failed = |e| Error::io(path, "opening", e);
-        let file = File::open(path).map_err(failed)?;
-        let meta = file.metadata().map_err(failed)?;
-        if !meta.is_file() {
-            return Err(Error::input(path, "not a regular file"));
-        }
-        let state = State::from_metadata(&meta);
+        let file = files::open(path)?;
+        let state = State::from_metadata(&file.metadata().map_err(failed)?);
         let map = match access {
             Access::Map if state.len > 0 => {
                 Some(RegisteredMap::new(&file, path).map_err(|e| Error::io(path, "mapping", e))?)

@@ -1,7 +1,7 @@
 //! Small files of text.
 
 use super::error::{Error, Result};
-use std::fs::File;
+use super::files;
 use std::io::Read;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub(crate) const MOST_BYTES: u64 = 16 << 20;
 /// A file that cannot be read, is empty, too large, or no UTF-8.
 pub fn read(path: &Path, kind: &str) -> Result<String> {
     let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    let file = files::open_or_stream(path)?;
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, "reading", e))?;
     from_bytes(bytes, kind).map_err(|what| Error::input(path, what))
 }

@@ -12,6 +12,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::source::scan::scan;
@@ -201,7 +202,7 @@ impl ArchiveScan {
         if path.metadata().map_err(failed)?.len() > MOST_BYTES {
             return Err(Error::input(path, "is no scan: it is too long"));
         }
-        let bytes = std::fs::read(path).map_err(failed)?;
+        let bytes = files::read(path)?;
         Self::from_json(&String::from_utf8_lossy(&bytes)).map_err(|what| Error::input(path, what))
     }
 

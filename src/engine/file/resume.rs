@@ -4,10 +4,10 @@
 //! there first, so that the finished file stays unchanged until its successor takes its name.
 
 use crate::file::CoefficientFile;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::output::Output;
 use wavesplat_core::source::scan::scan;
@@ -86,7 +86,7 @@ pub fn open_successor(file: &CoefficientFile, if_unfinished: IfUnfinished) -> Re
         Some(_) => Err(Error::path(part, Note::with("is of another file", Remedy::BeginAnew))),
         None => {
             out.begin_at(0)?;
-            let mut start = File::open(path).map_err(|e| Error::io(path, "opening", e))?.take(own.bytes());
+            let mut start = files::open(path)?.take(own.bytes());
             io::copy(&mut start, &mut out).map_err(|e| Error::io(&part, "copying", e))?;
             Ok((out, own))
         }

@@ -1,11 +1,11 @@
 //! Reads NumPy's `.npy`.
 
 use crate::shared::meaning::{Kind, Meaning};
-use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::Path;
 use wavesplat_core::base::description::AxisRole;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::npy::{Header, MAGIC};
 use wavesplat_core::base::sample::SampleType;
@@ -56,7 +56,7 @@ pub struct ArrayHeader {
 /// # Errors
 /// A file that cannot be read, a damaged header, types of samples that are not supported, Fortran order.
 pub fn array_header(path: &Path) -> Result<ArrayHeader> {
-    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    let file = files::open(path)?;
     let found = any_header(&mut BufReader::with_capacity(256, file), path)?;
     found.refuse_fortran(path)?;
     let AnyHeader { lengths, ty, big_endian, start, .. } = found;
@@ -69,7 +69,7 @@ pub fn array_header(path: &Path) -> Result<ArrayHeader> {
 /// Reads the header of one file and checks its size.
 pub(crate) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader> {
     let state = FileBytes::open(path, Access::Read)?.state();
-    let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+    let file = files::open(path)?;
     let refused = |e| Error::input(path, e);
     let array = read_any(&mut BufReader::with_capacity(256, file), path, options)?;
     check_size(state.len, array.start, &array.shape, array.ty, array.numbers()).map_err(refused)?;

@@ -8,6 +8,7 @@ use tiff::decoder::{Decoder, DecodingSampleType, Limits};
 use tiff::tags::{ByteOrder, Tag};
 use tiff::{TiffError, TiffResult};
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::Parsed;
 use wavesplat_core::source::layout::Layout;
@@ -75,7 +76,7 @@ pub(super) struct Pages {
 impl Pages {
     /// Opens a file at its first page.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, "opening", e))?;
+        let file = files::open(path)?;
         let mut limits = Limits::unlimited(); // the size of strips and tiles is known before one is decoded
         (limits.ifd_value_size, limits.decoding_buffer_size) = (MOST_TEXT, MOST_TEXT); // the latter of lists, too
         let decoder = Decoder::new(BufReader::new(file)).map_err(|e| refused(path, &e))?;

@@ -6,16 +6,16 @@ use quick_xml::Reader;
 use quick_xml::escape::escape;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashSet;
-use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::files;
 use wavesplat_core::source::Parsed;
 use wavesplat_core::source::series::FrameFiles;
 
 /// Reads the list; its files are found from its own folder.
 pub(crate) fn read(path: &Path) -> Result<FrameFiles> {
-    let bytes = fs::read(path).map_err(|e| Error::io(path, "reading", e))?;
+    let bytes = files::read(path)?;
     let text = std::str::from_utf8(&bytes).map_err(|e| Error::input(path, format!("is not UTF-8 text: {e}")))?;
     parse(text, path.parent().unwrap_or(Path::new(""))).map_err(|e| Error::input(path, e))
 }

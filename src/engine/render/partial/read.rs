@@ -2,12 +2,12 @@
 
 use super::head::{Head, PictureRecord, RecordSpan, SCHEMA};
 use super::{END, MAGIC};
-use std::fs::File;
 use std::io::{self, Read};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::address::refuse_address;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::files;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// The most bytes of a head, unpacked.
@@ -29,8 +29,7 @@ pub struct PartialFile {
 /// Whether a file begins as one of partial sums.
 pub fn is_partial(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
-    let is_file = std::fs::metadata(path).is_ok_and(|file| file.is_file());
-    is_file && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
+    files::open(path).is_ok_and(|mut file| file.read_exact(&mut start).is_ok()) && start == MAGIC
 }
 
 impl PartialFile {
@@ -122,8 +121,7 @@ fn unpacked(path: &Path, span: RecordSpan, bytes: usize) -> Result<Vec<u8>> {
 /// Reads bytes. Files are opened for each record, since there may be more of them than a process may keep open.
 fn read_at(path: &Path, offset: u64, bytes: usize) -> Result<Vec<u8>> {
     let mut buffer = vec![0; bytes];
-    let read = File::open(path).and_then(|file| file.read_exact_at(&mut buffer, offset));
-    match read {
+    match files::open(path)?.read_exact_at(&mut buffer, offset) {
         Ok(()) => Ok(buffer),
         Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Err(damaged(path, "it ends too early")),
         Err(e) => Err(Error::io(path, "reading", e)),
