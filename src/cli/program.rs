@@ -13,6 +13,7 @@ use std::process::{self, ExitCode};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped;
 use wavesplat_core::base::output::abandon;
+use wavesplat_core::base::temporary;
 
 /// Runs a program: parses its arguments, reports an error once, and turns it into the exit code.
 pub fn main<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
@@ -48,6 +49,7 @@ fn end(signal: i32) {
         note(""); // ends the line of a progress bar
     }
     let kept = abandon();
+    temporary::remove_all();
     note("error: interrupted");
     for part in kept {
         note(format_args!(

@@ -38,6 +38,13 @@ pub(super) fn is_own(headers: &HeaderMap) -> bool {
     (is_plain || is_local) && is_same
 }
 
+/// Whether a path begins with the token. This takes as long for any wrong word of its length.
+pub(super) fn has_token(path: &str, token: &str) -> bool {
+    let word = path.strip_prefix('/').and_then(|rest| rest.split('/').next()).unwrap_or_default();
+    let differs = word.bytes().zip(token.bytes()).fold(0, |differs, (a, b)| differs | (a ^ b));
+    word.len() == token.len() && differs == 0
+}
+
 /// Headers that allow browsers to show answers in a page of their own, and nothing else.
 pub(super) const HEADERS: [(&str, &str); 5] = [
     ("cache-control", "no-store"),
@@ -83,6 +90,24 @@ mod tests {
         assert_eq!(chosen("abcdefgh-0123_456"), Some("abcdefgh-0123_456".into()));
         assert_eq!([chosen(""), chosen("0123456789abcde"), chosen("0123456789/abcdef")], [None, None, None]);
         assert_eq!(chosen_token(None).expect("a token").len(), 32);
+    }
+
+    #[test]
+    fn paths_begin_with_the_token() {
+        for (path, has) in [
+            ("/abc/", true),
+            ("/abc/pictures", true),
+            ("/abc", true),
+            ("abc/", false),
+            ("/abcd/", false),
+            ("/ab/", false),
+            ("/abd/abc/", false),
+            ("//abc/", false),
+            ("/", false),
+            ("", false),
+        ] {
+            assert_eq!(has_token(path, "abc"), has, "{path}");
+        }
     }
 
     #[test]

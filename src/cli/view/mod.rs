@@ -1,6 +1,8 @@
 //! `wavesplat view`: shows a file or frames in the browser.
 
+mod answers;
 mod browser;
+mod connections;
 mod guard;
 mod server;
 

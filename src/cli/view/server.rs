@@ -1,17 +1,20 @@
 //! The server of the page: it renders what the page asks for, one request after another, as long as the page waits.
 
+use super::answers::AnswerRoom;
+use super::connections::{Connection, Connections, PATIENCE, Patient};
 use super::guard;
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::{Query, Request, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
-use axum::middleware::{self, Next};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::collections::HashMap;
+use std::convert::Infallible;
 use std::io;
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,17 +22,14 @@ use std::time::Duration;
 use tokio::sync::{Notify, Semaphore};
 use tower_service::Service;
 use wavesplat_core::base::cancel::CancelToken;
-use wavesplat_core::base::error::Result;
+use wavesplat_core::base::error::{Error, Result};
 use wavesplat_jobs::picture::{Saved, ViewRequest, ViewerSession};
 
 /// Most bytes of a request.
 const MOST_BYTES: usize = 64 << 10;
 /// Most requests that are answered or wait at a time.
 const MOST_REQUESTS: usize = 64;
-/// Most connections at a time. More wait until one ends.
-const MOST_CONNECTIONS: usize = 256;
-/// The time that a client has to send the head of a request, and then its body.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// The wait until a connection can be taken again.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// What all requests share.
@@ -43,6 +43,7 @@ pub(super) struct Server {
     /// The current work, or the last one.
     work: Mutex<Arc<CancelToken>>,
     requests: Semaphore,
+    answers: AnswerRoom,
 }
 
 /// Stops a server, from any thread.
@@ -78,7 +79,8 @@ impl IntoResponse for Failed {
 impl Server {
     pub(super) fn new(session: ViewerSession, facts: String, token: String) -> Self {
         let (renders, requests) = (Arc::new(Semaphore::new(1)), Semaphore::new(MOST_REQUESTS));
-        Self { session: Arc::new(session), facts, token, renders, work: Mutex::default(), requests }
+        let answers = AnswerRoom::new(session.memory_of_answers());
+        Self { session: Arc::new(session), facts, token, renders, work: Mutex::default(), requests, answers }
     }
 
     /// Answers requests until `stop` is called.
@@ -86,16 +88,15 @@ impl Server {
         listener.set_nonblocking(true)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let ended = runtime.block_on(async {
-            let answering = serve(tokio::net::TcpListener::from_std(listener)?, self.router());
+            let answering = serve(tokio::net::TcpListener::from_std(listener)?, Arc::new(self));
             tokio::select! { ended = answering => ended, () = stop.0.notified() => Ok(()) }
         });
         runtime.shutdown_background(); // does not wait for pictures that nobody sees
         ended
     }
 
-    fn router(self) -> Router {
-        let shared = Arc::new(self);
-        let at = |name: &str| format!("/{}/{name}", shared.token);
+    fn router(self: &Arc<Self>) -> Router {
+        let at = |name: &str| format!("/{}/{name}", self.token);
         let pages = Router::new()
             .route(&at(""), get(page))
             .route(&at("pictures"), post(pictures))
@@ -104,15 +105,15 @@ impl Server {
             .route(&at("series"), post(series))
             .route(&at("command"), post(command))
             .route(&at("save"), post(save));
-        let admitted = middleware::from_fn_with_state(shared.clone(), admit);
-        pages.with_state(shared).layer(admitted)
+        pages.with_state(self.clone())
     }
 
-    /// Renders, after earlier work has ended. The work ends soon if the client disconnects.
-    async fn render<T: Send + 'static>(
+    /// Renders, after earlier work has ended, and waits until the result has room. The work ends soon if the client
+    /// disconnects.
+    async fn render(
         &self,
-        work: impl FnOnce(&ViewerSession, &CancelToken) -> Result<T> + Send + 'static,
-    ) -> std::result::Result<T, Failed> {
+        work: impl FnOnce(&ViewerSession, &CancelToken) -> Result<Vec<u8>> + Send + 'static,
+    ) -> std::result::Result<Bytes, Failed> {
         let busy = |_| Failed(StatusCode::SERVICE_UNAVAILABLE, "the server ends".into());
         let turn = self.renders.clone().acquire_owned().await.map_err(busy)?;
         let (session, wait) = (self.session.clone(), Wait(Arc::default()));
@@ -120,51 +121,75 @@ impl Server {
         self.work.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&own);
         let done = tokio::task::spawn_blocking(move || {
             let done = work(&session, &own).inspect_err(|error| session.reopen_after(error));
-            drop(turn);
-            done
+            (done, turn)
         });
         match done.await {
-            Ok(Ok(done)) => Ok(done),
-            Ok(Err(e)) => Err(Failed(StatusCode::BAD_REQUEST, e.to_string())),
+            Ok((Ok(done), _turn)) => Ok(self.answers.hold(done).await),
+            Ok((Err(e), _)) => Err(Failed(StatusCode::BAD_REQUEST, e.to_string())),
             Err(_) => Err(Failed(StatusCode::INTERNAL_SERVER_ERROR, "rendering failed".into())),
         }
     }
+
+    /// Why a request gets no answer, from its head alone; none if it comes from the server's own page, with the token.
+    fn refusal(&self, request: &Request) -> Option<StatusCode> {
+        match guard::is_own(request.headers()) {
+            false => Some(StatusCode::FORBIDDEN),
+            true if !guard::has_token(request.uri().path(), &self.token) => Some(StatusCode::NOT_FOUND),
+            true => None,
+        }
+    }
+
+    /// Answers a request of a connection.
+    async fn answer(&self, connection: &Connection, router: Router, request: Request) -> Response {
+        let mut answer = match self.refusal(&request) {
+            Some(status) => closing(status),
+            None if !connection.is_placed() => closing(StatusCode::SERVICE_UNAVAILABLE),
+            None => self.admitted(router, request).await,
+        };
+        for (name, value) in guard::HEADERS {
+            answer.headers_mut().insert(HeaderName::from_static(name), HeaderValue::from_static(value));
+        }
+        answer
+    }
+
+    /// Answers a request with the token, at most [`MOST_REQUESTS`] at a time.
+    async fn admitted(&self, mut router: Router, request: Request) -> Response {
+        let Ok(_permit) = self.requests.try_acquire() else { return closing(StatusCode::SERVICE_UNAVAILABLE) };
+        let Some(request) = whole(request).await else { return closing(StatusCode::BAD_REQUEST) };
+        router.call(request).await.unwrap_or_else(|never| match never {})
+    }
+}
+
+/// An answer without content, after which the connection closes.
+fn closing(status: StatusCode) -> Response {
+    (status, [(header::CONNECTION, "close")]).into_response()
 }
 
 /// Answers connections side by side.
-async fn serve(listener: tokio::net::TcpListener, router: Router) -> io::Result<()> {
-    let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
-    while let Ok(place) = places.clone().acquire_owned().await {
+async fn serve(listener: tokio::net::TcpListener, server: Arc<Server>) -> io::Result<()> {
+    let (router, connections) = (server.router(), Connections::new());
+    for number in 0.. {
         let Ok((stream, _)) = listener.accept().await else {
-            tokio::time::sleep(PAUSE).await; // too many open files: some will close
+            connections.close_oldest(); // too many open files
+            tokio::time::sleep(PAUSE).await;
             continue;
         };
-        let router = router.clone();
-        let answer = service_fn(move |request| router.clone().call(request));
+        let connection = Arc::new(connections.connection(number));
+        let (router, server) = (router.clone(), server.clone());
+        let answer = service_fn(move |request: hyper::Request<Incoming>| {
+            let (connection, router, server) = (connection.clone(), router.clone(), server.clone());
+            async move { Ok::<_, Infallible>(server.answer(&connection, router, request.map(Body::new)).await) }
+        });
         let mut http = http1::Builder::new();
         http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
-        tokio::spawn(async move {
-            let _ = http.serve_connection(TokioIo::new(stream), answer).await; // the client's fault
-            drop(place);
+        let served = http.serve_connection(TokioIo::new(Patient::new(stream)), answer);
+        let task = tokio::spawn(async move {
+            let _ = served.await; // the client's fault
         });
+        connections.add(number, task.abort_handle());
+        tokio::task::yield_now().await; // it reads what has arrived before another comes
     }
     Ok(())
-}
-
-/// Admits requests from the server's own page, at most [`MOST_REQUESTS`] at a time.
-async fn admit(State(server): Shared, request: Request, next: Next) -> Response {
-    let mut answer = match server.requests.try_acquire() {
-        _ if !guard::is_own(request.headers()) => StatusCode::FORBIDDEN.into_response(),
-        Ok(_place) => match whole(request).await {
-            Some(request) => next.run(request).await,
-            None => StatusCode::BAD_REQUEST.into_response(),
-        },
-        Err(_) => StatusCode::SERVICE_UNAVAILABLE.into_response(),
-    };
-    for (name, value) in guard::HEADERS {
-        answer.headers_mut().insert(HeaderName::from_static(name), HeaderValue::from_static(value));
-    }
-    answer
 }
 
 /// A request with its whole body, unless that is too long or too slow.
@@ -175,7 +200,7 @@ async fn whole(request: Request) -> Option<Request> {
 }
 
 async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed> {
-    let failed = |e: wavesplat_core::base::error::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
+    let failed = |e: Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
     let nonce = guard::token().map_err(failed)?;
     ViewerSession::page(&server.facts, &nonce).map(Html).map_err(failed)
 }
@@ -192,7 +217,7 @@ async fn progress(State(server): Shared) -> String {
 }
 
 /// The time series of a point, given as three shares of the axes.
-async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Vec<u8>, Failed> {
+async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Bytes, Failed> {
     let refused = |e: serde_json::Error| Failed(StatusCode::BAD_REQUEST, format!("not a point: {e}"));
     let point: [f64; 3] = serde_json::from_slice(&body).map_err(refused)?;
     server.render(move |session, work| session.series(point, work)).await
@@ -205,10 +230,11 @@ async fn histogram(
 ) -> std::result::Result<Response, Failed> {
     let number = |text: &String| text.parse().map_err(|_| Failed(StatusCode::BAD_REQUEST, "frame: no number".into()));
     let frame = query.get("frame").map(number).transpose()?;
-    let histogram = server.render(move |session, work| session.histogram(frame, work)).await?;
-    let failed = |e: serde_json::Error| Failed(StatusCode::INTERNAL_SERVER_ERROR, e.to_string());
-    let text = serde_json::to_string(&histogram).map_err(failed)?;
-    Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
+    let failed = |e: serde_json::Error| Error::setting("histogram", e.to_string());
+    let text = move |session: &ViewerSession, work: &CancelToken| {
+        serde_json::to_vec(&session.histogram(frame, work)?).map_err(failed)
+    };
+    Ok(([(header::CONTENT_TYPE, "application/json")], server.render(text).await?).into_response())
 }
 
 async fn command(

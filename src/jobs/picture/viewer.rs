@@ -19,6 +19,7 @@ use wavesplat_core::base::cancel::CancelToken;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::Output;
 use wavesplat_core::base::progress::Silent;
+use wavesplat_core::base::temporary::TemporaryFolder;
 use wavesplat_core::colour::Distribution;
 use wavesplat_engine::render::annotate::AxisLabels;
 use wavesplat_engine::render::page::{self, Planes};
@@ -32,6 +33,8 @@ pub struct ViewerSession {
     base: PictureRequest,
     /// Words for how the inputs are opened.
     input_words: Vec<String>,
+    /// Bytes of memory for answers.
+    answers: usize,
 }
 
 /// The facts about the scene that a page gets before it asks for pictures.
@@ -87,7 +90,14 @@ impl ViewerSession {
     /// A viewer of some inputs; `base` has the settings of all pictures. The commands that it gives have `input_words` for
     /// how the inputs are opened.
     pub fn new(session: &Session, base: PictureRequest, input_words: Vec<String>) -> Self {
-        Self { session: session.keeping_decoded(), base: PictureRequest { output: PAGE.into(), ..base }, input_words }
+        let answers = session.memory / ANSWERS_SHARE;
+        let session = session.with_memory(session.memory - answers).keeping_decoded();
+        Self { session, base: PictureRequest { output: PAGE.into(), ..base }, input_words, answers }
+    }
+
+    /// Bytes of memory for finished answers until they are sent. Pictures in the making take the rest.
+    pub fn memory_of_answers(&self) -> usize {
+        self.answers
     }
 
     /// Opens a file that has changed again for the next picture.
@@ -192,7 +202,7 @@ impl ViewerSession {
             self.write(view, saved, out, work)?;
             return Ok(bytes.try_recv().unwrap_or_default());
         }
-        let folder = tempfile::tempdir().map_err(|e| Error::io(std::env::temp_dir(), "creating a folder", e))?;
+        let folder = TemporaryFolder::new()?;
         let path = folder.path().join(saved.name());
         self.write(view, saved, Output::create(&path, true)?, work)?;
         std::fs::read(&path).map_err(|e| Error::io(&path, "reading", e))
@@ -312,6 +322,9 @@ fn opacities(mode: &Mode) -> Option<Vec<(f64, f64)>> {
     let (lo, hi) = transfer.range();
     Some(transfer.opacity_points().iter().map(|(value, opacity)| ((value - lo) / (hi - lo), *opacity)).collect())
 }
+
+/// One part in so many of the memory holds finished answers.
+const ANSWERS_SHARE: usize = 4;
 
 /// Parts of a histogram: many more than a page draws, for it may draw a part of the range.
 const BARS: usize = 2048;
