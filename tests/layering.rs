@@ -83,7 +83,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
     ("axum::", &["cli/view/"]),
     ("hyper::", &["cli/view/server.rs"]),
     ("hyper_util::", &["cli/view/server.rs"]),
-    ("tokio::", &["cli/view/server.rs"]),
+    ("tokio::", &["cli/view/"]),
     ("tower_service::", &["cli/view/server.rs"]),
     ("getrandom::", &["cli/view/guard.rs"]),
     ("half::f16", &["core/base/half.rs"]), // its tests

@@ -43,6 +43,7 @@ mod resume_and_append; // resumed runs and appended frames
 mod several_variables; // several variables, and magnitudes of vectors
 mod shards; // shards and merging
 mod slices; // slices through the volume
+mod special_files; // pipes, devices, sockets and folders where a file is expected
 mod system_limits; // limits of the system on memory and on the size of files
 mod times; // times, dates and calendars
 

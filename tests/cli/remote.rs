@@ -3,7 +3,8 @@
 use super::{Archive, Run, Work};
 use crate::common::http::{Fate, Server};
 use std::collections::BTreeSet;
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Instant;
 
@@ -201,14 +202,137 @@ fn wrong_bits_are_noticed() {
     let work = work();
     for seed in 0..40_usize {
         let bit = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
-        let server =
-            Server::with(
-                bytes().clone(),
-                move |asked| {
-                    if asked.number % 4 == seed % 4 { Fate::Flipped(bit) } else { Fate::Answer }
-                },
-            );
+        let mut wrong = bytes().clone();
+        let at = bit / 8 % wrong.len();
+        wrong[at] ^= 1 << (bit % 8);
+        let server = Server::with(bytes().clone(), move |_| Fate::Replaced(wrong.clone(), "\"one\"".into()));
         work.remote(&server, "$WAVESPLAT verify URL").fails_or_finds(3, &["/run.wspl: "]);
+    }
+}
+
+#[test]
+fn bits_that_are_wrong_once_are_read_again() {
+    let work = work();
+    let info = work.wavesplat("info run.wspl").ok().text().to_string();
+    work.wavesplat("extract run.wspl -o right.npy").ok();
+    work.render("run.wspl --size 64x48 --frames 20 -o right.png").ok();
+    for seed in 0..7_usize {
+        let bit = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 20;
+        let serve = || {
+            let fate = move |number| if number == seed { Fate::Flipped(bit) } else { Fate::Answer };
+            Server::with(bytes().clone(), move |asked| fate(asked.number))
+        };
+        let server = serve();
+        let found = work.remote(&server, "$WAVESPLAT info URL").ok();
+        assert_eq!(found.text().replace(&server.address(), "run.wspl"), info, "{seed}");
+        for (line, output) in [
+            ("$WAVESPLAT extract URL -o out.npy --force", "npy"),
+            ("$WAVESPLAT extract URL --cache kept -o out.npy --force", "npy"),
+            ("$RENDER URL --size 64x48 --frames 20 -o out.png --force", "png"),
+        ] {
+            work.remote(&serve(), line).ok();
+            assert!(work.read(&format!("out.{output}")) == work.read(&format!("right.{output}")), "{seed}: {line}");
+        }
+        work.shell("rm -rf kept").ok();
+    }
+}
+
+#[test]
+fn what_a_wrong_answer_left_in_a_cache_is_mended() {
+    let work = work();
+    work.wavesplat("extract run.wspl -o right.npy").ok();
+    for (from, to) in [(200_000, 300_000), (bytes().len() - 30_000, bytes().len()), (90_000, bytes().len())] {
+        let wrong = move || {
+            let mut wrong = bytes().clone();
+            wrong[from..to].iter_mut().for_each(|byte| *byte ^= 0x55);
+            wrong
+        };
+        let is_sound = Arc::new(AtomicBool::new(false));
+        let sound = is_sound.clone();
+        let server = Server::with(bytes().clone(), move |asked| match asked.range.start == 0 || sound.load(Relaxed) {
+            true => Fate::Answer,
+            false => Fate::Replaced(wrong(), "\"one\"".into()),
+        });
+        let line = "$WAVESPLAT extract URL --cache kept -o out.npy --force";
+        let failed = work.remote(&server, line).fails(3, &["damaged at byte", "asked twice"]);
+        assert!(!failed.message().contains("--skip-damaged reads the rest"), "{}", failed.message());
+        work.shell("ls kept/*/*.page").ok();
+        is_sound.store(true, Relaxed);
+        work.remote(&server, line).ok();
+        assert!(work.read("out.npy") == work.read("right.npy"), "{from}..{to}");
+        work.shell("rm -rf kept").ok();
+    }
+}
+
+#[test]
+fn a_cache_deletes_and_follows_nothing_of_others() {
+    let (work, server) = (work(), Server::of(bytes().clone()));
+    let line = "$WAVESPLAT extract URL --cache kept --cache-size 500kB -o out.npy --force";
+    for name in ["mine/0000000000.page", "kept/wavesplat-notes/0000000001.page", "kept/0000000002.page"] {
+        work.write(name, vec![1; 900_000]);
+        work.shell(&format!("touch -d 1980-01-01 {name}")).ok();
+    }
+    work.shell("ln -s $PWD/mine kept/wavesplat-0123456789abcdef0123456789abcdef").ok();
+    work.remote(&server, line).ok();
+    for name in ["mine/0000000000.page", "kept/wavesplat-notes/0000000001.page", "kept/0000000002.page"] {
+        assert_eq!(work.read(name).len(), 900_000, "{name}");
+    }
+    work.shell("rm kept/wavesplat-0123*; f=$(ls -d kept/wavesplat-????????????????????????????????); rm -r $f; ln -s $PWD/mine $f").ok();
+    work.remote(&server, line).ok();
+    assert_eq!(work.shell("ls mine").ok().text(), "0000000000.page\n", "nothing is written through a link");
+}
+
+#[test]
+fn pauses_that_a_server_asks_for_are_noted_and_limited() {
+    let work = work();
+    let busy = |wait: &str| Fate::Refuse(503, format!("Retry-After: {wait}\r\n"), String::new());
+    for (wait, shown) in [("3600", "asks for 3600 s"), ("Fri, 31 Dec 9999 23:59:59 GMT", "asks for 2")] {
+        let (begin, wait) = (Instant::now(), wait.to_string());
+        let rule = move |number| if number < 2 { busy(&wait) } else { Fate::Answer };
+        let server = Server::with(bytes().clone(), move |asked| rule(asked.number));
+        let run = work.remote(&server, "$WAVESPLAT info URL --timeout 1").ok();
+        assert!(run.message().contains(shown) && run.message().contains("/run.wspl: "), "{}", run.message());
+        assert!(run.message().contains("asking again in 1.0 s") && begin.elapsed().as_secs() < 20);
+    }
+    let server = Server::with(bytes().clone(), move |asked| if asked.number < 1 { busy("60") } else { Fate::Answer });
+    assert_eq!(work.remote(&server, "$WAVESPLAT info URL --timeout 0.5 -q").ok().message(), "");
+    let server = Server::with(bytes().clone(), move |_| busy("90"));
+    work.remote(&server, "$RENDER URL -o a.png --timeout 0.1")
+        .fails(1, &["asks for 90 s, more than the 0.1 s of --timeout"]);
+}
+
+#[test]
+fn a_password_goes_to_no_other_server() {
+    let work = work();
+    let other = Server::of(bytes().clone());
+    let ask = |server: &Server| {
+        let address = format!("http://me:hidden@127.0.0.1:{}/old/run.wspl?sig=hidden", server.port());
+        work.shell(&format!("NO_PROXY=127.0.0.1,localhost $WAVESPLAT info '{address}'")).ok()
+    };
+    for place in ["http://127.0.0.1:PORT/run.wspl", "http://localhost:PORT/x", "//other:word@127.0.0.1:PORT/run.wspl"] {
+        let to = format!("Location: {}\r\n", place.replace("PORT", &other.port().to_string()));
+        let server = Server::with(bytes().clone(), move |_| Fate::Refuse(307, to.clone(), String::new()));
+        ask(&server);
+        assert!(server.asked().iter().all(|asked| asked.authorization.is_some()));
+        let asked = other.asked();
+        assert!(!asked.is_empty() && asked.iter().all(|asked| asked.authorization.is_none()), "{place}: {asked:?}");
+        assert!(asked.iter().all(|asked| !asked.path.contains("hidden")), "{place}: {asked:?}");
+    }
+    for place in ["/new/run.wspl", "../new/run.wspl"] {
+        let moved = move |path: &str| match path.starts_with("/old") {
+            true => Fate::Refuse(302, format!("Location: {place}\r\n"), "moved".into()),
+            false => Fate::Answer,
+        };
+        let server = Server::with(bytes().clone(), move |asked| moved(&asked.path));
+        ask(&server);
+        let asked = server.asked();
+        assert!(asked.iter().all(|asked| asked.authorization.is_some()), "{asked:?}");
+        assert!(asked.iter().any(|asked| asked.path == "/new/run.wspl"), "{asked:?}");
+    }
+    for place in ["file:///etc/passwd", "ftp://127.0.0.1/run.wspl"] {
+        let to = format!("Location: {place}\r\n");
+        let server = Server::with(bytes().clone(), move |_| Fate::Refuse(302, to.clone(), String::new()));
+        work.remote(&server, "$WAVESPLAT info URL").fails(1, &["not of HTTP"]);
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod browser; // helper: a browser without a window
 mod controls; // controls of the page: colours, opacities, slices, keys, saving
+mod crowds; // many clients: those without the token, and those that do not read
 mod foreign_requests; // requests that no page of the viewer sends
 mod interaction; // dragging, the wheel, keys, sliders, playing
 mod pages; // pages that hold their pictures

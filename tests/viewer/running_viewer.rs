@@ -25,7 +25,17 @@ impl Served {
     }
 
     pub(super) fn start_with(work: &Work, args: &str, token: Option<&str>) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_wavesplat"));
+        Self::start_by(Command::new(env!("CARGO_BIN_EXE_wavesplat")), work, args, token)
+    }
+
+    /// As from a terminal, so that it heeds Ctrl-C, with a folder of the work for temporary files.
+    pub(super) fn start_interruptible(work: &Work, args: &str) -> Self {
+        let mut command = Command::new("env");
+        command.args(["--default-signal=INT,TERM", env!("CARGO_BIN_EXE_wavesplat")]).env("TMPDIR", work.path("tmp"));
+        Self::start_by(command, work, args, None)
+    }
+
+    fn start_by(mut command: Command, work: &Work, args: &str, token: Option<&str>) -> Self {
         command.args(["view", "--no-open"]).args(args.split_whitespace()).current_dir(work.path(""));
         command.stdout(Stdio::piped()).stderr(Stdio::null()).env_remove("WAVESPLAT_TOKEN");
         command.envs(token.map(|token| ("WAVESPLAT_TOKEN", token)));

@@ -27,6 +27,8 @@ use wavesplat_jobs::picture::{Saved, ViewRequest, ViewerSession};
 
 /// Most bytes of a request.
 const MOST_BYTES: usize = 64 << 10;
+/// Most bytes of the head of a request, and of a body that is read at a time.
+const MOST_HEAD: usize = 16 << 10;
 /// Most requests that are answered or wait at a time.
 const MOST_REQUESTS: usize = 64;
 /// The wait until a connection can be taken again.
@@ -124,7 +126,7 @@ impl Server {
             (done, turn)
         });
         match done.await {
-            Ok((Ok(done), _turn)) => Ok(self.answers.hold(done).await),
+            Ok((Ok(done), turn)) => Ok(self.answers.hold(done, turn).await),
             Ok((Err(e), _)) => Err(Failed(StatusCode::BAD_REQUEST, e.to_string())),
             Err(_) => Err(Failed(StatusCode::INTERNAL_SERVER_ERROR, "rendering failed".into())),
         }
@@ -181,7 +183,7 @@ async fn serve(listener: tokio::net::TcpListener, server: Arc<Server>) -> io::Re
             async move { Ok::<_, Infallible>(server.answer(&connection, router, request.map(Body::new)).await) }
         });
         let mut http = http1::Builder::new();
-        http.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
+        http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(MOST_HEAD);
         let served = http.serve_connection(TokioIo::new(Patient::new(stream)), answer);
         let task = tokio::spawn(async move {
             let _ = served.await; // the client's fault

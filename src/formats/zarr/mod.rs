@@ -1,5 +1,7 @@
 //! Zarr: stores of versions 2 and 3 are read, those of version 2 written.
 
+#[cfg(feature = "zarr")]
+mod files;
 mod layout;
 #[cfg(feature = "zarr")]
 mod ome;

@@ -1,5 +1,6 @@
 //! Zarr stores of versions 2 and 3 as [`ArrayFile`].
 
+use super::files::FilesystemStore;
 use super::layout::{DIMENSIONS, metadata_file};
 use super::ome::{Coordinates, Multiscales, Resolutions};
 use crate::arrays::describe::numbers;
@@ -16,7 +17,6 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::stored::StoredType;
 use wavesplat_core::source::{OpenOptions, Parsed};
 use zarrs::array::{Array, ArrayBytes, ArrayMetadata, ArrayShardedExt, ArraySubset, DataType, data_type};
-use zarrs::filesystem::FilesystemStore;
 use zarrs::group::Group;
 
 const MOST_DEPTH: usize = 16;

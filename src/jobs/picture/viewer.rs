@@ -324,7 +324,7 @@ fn opacities(mode: &Mode) -> Option<Vec<(f64, f64)>> {
 }
 
 /// One part in so many of the memory holds finished answers.
-const ANSWERS_SHARE: usize = 4;
+const ANSWERS_SHARE: usize = 8;
 
 /// Parts of a histogram: many more than a page draws, for it may draw a part of the range.
 const BARS: usize = 2048;
