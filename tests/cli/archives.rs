@@ -152,6 +152,19 @@ fn info_describes_frames_and_estimates_their_file() {
 }
 
 #[test]
+fn a_table_of_estimates_of_a_larger_archive_is_near_the_true_sizes() {
+    let work = Work::new();
+    work.write("a.npy", Archive::smooth([80, 72, 60], 26).npy());
+    let told = work.wavesplat("info a.npy --estimate --json").ok().json();
+    for estimate in told["estimates"].as_array().unwrap().iter().take(4) {
+        let tolerance = estimate["tolerance"].as_f64().unwrap();
+        work.wavesplat(&format!("convert a.npy -o a.wspl --force --tolerance {tolerance}")).ok();
+        let ratio = estimate["bytes"].as_f64().unwrap() / work.read("a.wspl").len() as f64;
+        assert!((0.6..1.6).contains(&ratio), "{tolerance}: {ratio} times the true size");
+    }
+}
+
+#[test]
 fn an_estimate_finds_a_peak_within_a_window() {
     let (work, mut archive) = (Work::new(), Archive::smooth([50, 40, 30], 40));
     let voxels = archive.frame_len();

@@ -129,6 +129,42 @@ fn longer_windows_are_suggested_where_they_help() {
 }
 
 #[test]
+fn a_few_voxels_over_a_long_time_need_longer_windows_and_are_no_noise() {
+    let walk = |t: usize| (t as f32 * 0.0172).sin() * 10.0 + ((t * t * 31 + t * 17) % 101) as f32 * 0.02;
+    for (dims, frames) in [([2, 2, 2], 3000), ([1, 1, 1], 4000), ([3, 2, 1], 2200)] {
+        let work = Work::new();
+        work.write("a.npy", Archive::of(dims, frames, |x, y, z, t| walk(t) + (x + 2 * y + 3 * z) as f32).npy());
+        let run = work.wavesplat("convert a.npy -o a.wspl").ok();
+        let said = warnings(&run);
+        assert!(
+            said.contains("larger than the samples: a window of 32 frames takes") && !said.contains("noise"),
+            "{said}"
+        );
+        assert!(said.contains("try --window 512"), "{said}");
+        let longer = work.wavesplat("convert a.npy -o b.wspl --window 512").ok();
+        assert!(!warnings(&longer).contains("larger"), "{}", longer.err);
+        assert!(2 * work.read("b.wspl").len() < work.read("a.wspl").len());
+        work.wavesplat("verify b.wspl --against a.npy").ok();
+    }
+}
+
+#[test]
+fn long_windows_learn_functions_only_of_enough_voxels() {
+    let work = Work::new();
+    let cases = [([2, 2, 2], 1024, false), ([5, 4, 3], 300, false), ([24, 20, 6], 300, true)];
+    for (dims, window, learns) in cases {
+        let value = |x: usize, y: usize, z: usize, t: usize| ((x + y * 3 + z * 5) % 7) as f32 * (t as f32 / 40.0).sin();
+        work.write("a.npy", Archive::of(dims, window, value).npy());
+        work.wavesplat(&format!("convert a.npy -o a.wspl --force --window {window}")).ok();
+        let told = work.wavesplat("info a.wspl").ok();
+        assert_eq!(told.text().contains("learned"), learns, "{dims:?}: {}", told.text());
+        work.wavesplat("verify a.wspl --against a.npy").ok();
+        work.wavesplat(&format!("convert a.npy -o b.wspl --force --window {window} --basis learned")).ok();
+        work.wavesplat("verify b.wspl --against a.npy").ok();
+    }
+}
+
+#[test]
 fn negative_decoded_samples_are_warned_of_and_clipped() {
     let work = Work::new();
     let archive = changed(|_, v| (v - 0.5).max(0.0));

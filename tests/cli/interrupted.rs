@@ -117,3 +117,128 @@ fn a_job_in_the_background_is_not_interrupted() {
     Run::of("in the background", child.wait_with_output().unwrap()).ok();
     assert_eq!(work.names(), ["a.wspl"]);
 }
+
+/// Commands, the name under which each writes, and all names of its output.
+const IN_PARTS: [(&str, &str, &[&str]); 5] = [
+    ("$WAVESPLAT extract a.wspl -o o.zarr", "o.zarr.part", &["o.zarr"]),
+    ("$WAVESPLAT extract a.wspl -o o.nhdr", "o.raw.part", &["o.nhdr", "o.raw"]),
+    ("$WAVESPLAT extract a.wspl -o o.pvd", "o.part", &["o", "o.pvd"]),
+    ("$WAVESPLAT extract a.wspl -o o.nii.gz", "o.nii.gz.part", &["o.nii.gz"]),
+    ("$RENDER a.wspl --size 300x300 -o o.html", "o.html.part", &["o.html"]),
+];
+
+/// A folder with a file to read, and its names.
+fn with_file() -> (Work, Vec<String>) {
+    let work = Work::new();
+    work.write("a.npy", archive().npy());
+    work.wavesplat("convert a.npy -o a.wspl --window 4").ok();
+    let names = work.names();
+    (work, names)
+}
+
+fn without_output(work: &Work, outputs: &[&str]) {
+    let names: Vec<String> = outputs.iter().flat_map(|name| [name.to_string(), format!("{name}.part")]).collect();
+    work.shell(&format!("rm -rf {}", names.join(" "))).ok();
+}
+
+/// Starts a command, and sends a signal some time after its output has appeared. Returns its exit code.
+fn signalled(work: &Work, line: &str, part: &str, name: &str, after: Duration) -> Option<i32> {
+    let mut child = start(work, &format!("{line} --threads 1 -q"));
+    if appears(work, &mut child, part, false) {
+        std::thread::sleep(after);
+        signal(&child, name);
+    }
+    child.wait_with_output().unwrap().status.code()
+}
+
+#[test]
+fn output_of_several_files_is_all_there_or_not_at_all() {
+    let (work, before) = with_file();
+    for (line, part, outputs) in IN_PARTS {
+        let mut interrupts = 0;
+        for round in 0..24_u64 {
+            without_output(&work, outputs);
+            let name = if round % 2 == 0 { "INT" } else { "TERM" };
+            let code = signalled(&work, line, part, name, Duration::from_micros(700 * (round % 12)));
+            interrupts += usize::from(code != Some(0));
+            let expected: Vec<String> = match code {
+                Some(0) => before.iter().cloned().chain(outputs.iter().map(ToString::to_string)).collect(),
+                _ => before.clone(),
+            };
+            assert!(code == Some(0) || [130, 143].map(Some).contains(&code), "{line}: {code:?}");
+            assert_eq!(work.names(), expected, "{line}: {code:?}");
+        }
+        assert!(interrupts > 0, "{line}: always ended in time");
+        without_output(&work, outputs);
+    }
+}
+
+#[test]
+fn an_interrupted_replacement_leaves_what_was_there() {
+    let (work, _) = with_file();
+    for (line, part, outputs) in IN_PARTS {
+        work.shell(line).ok();
+        let names = work.names();
+        let kept = work.shell(&format!("cat $(find {} -type f | sort) | cksum", outputs.join(" "))).ok();
+        for round in 0..6_u64 {
+            signalled(&work, &format!("{line} --force --frames 3:30"), part, "INT", Duration::from_micros(500 * round));
+            if work.names() != names {
+                panic!("{line}: {:?}", work.names());
+            }
+        }
+        work.shell(&format!("{line} --force")).ok();
+        let again = work.shell(&format!("cat $(find {} -type f | sort) | cksum", outputs.join(" "))).ok();
+        assert_eq!(again.text(), kept.text(), "{line}");
+    }
+}
+
+#[test]
+fn what_a_killed_run_left_blocks_no_later_run() {
+    let (work, before) = with_file();
+    for (line, part, outputs) in IN_PARTS {
+        work.shell(line).ok();
+        let sum = format!("cat $(find {} -type f | sort) | cksum", outputs.join(" "));
+        let whole = work.shell(&sum).ok();
+        let all = work.names();
+        for (force, at) in [("", 0), ("", 5), ("--force", 3)] {
+            if force.is_empty() {
+                without_output(&work, outputs);
+            }
+            signalled(&work, &format!("{line} {force}"), part, "KILL", Duration::from_millis(at));
+            let is_done = force.is_empty() && work.names() == all;
+            work.shell(&format!("{line} {}", if is_done { "--force" } else { force })).ok();
+            assert_eq!(work.names(), all, "{line}");
+            assert_eq!(work.shell(&sum).ok().text(), whole.text(), "{line}");
+        }
+        without_output(&work, outputs);
+    }
+    assert_eq!(work.names(), before);
+}
+
+#[test]
+fn a_folder_of_somebody_else_is_not_taken_for_a_killed_run() {
+    let (work, _) = with_file();
+    for (line, part) in [("extract a.wspl -o o.zarr", "o.zarr.part"), ("extract a.wspl -o o.pvd", "o.part")] {
+        work.write(&format!("{part}/mine.txt"), "mine");
+        for force in ["", "--force"] {
+            work.wavesplat(&format!("{line} {force}")).fails(2, &[part, "is in the way"]);
+        }
+        assert_eq!(work.read(&format!("{part}/mine.txt")), b"mine");
+        work.shell(&format!("rm -r {part}; ln -s / {part}")).ok();
+        work.wavesplat(line).fails(2, &[part, "is in the way"]);
+    }
+}
+
+#[test]
+fn two_runs_do_not_write_one_folder() {
+    let (work, _) = with_file();
+    for (line, part) in [("extract a.wspl -o o.zarr", "o.zarr.part"), ("extract a.wspl -o o.pvd", "o.part")] {
+        let marker = if part.contains("zarr") { ".zgroup" } else { ".unfinished" };
+        work.write(&format!("{part}/{marker}"), "");
+        let held = fs::File::open(work.path(part)).unwrap();
+        held.lock().unwrap();
+        work.wavesplat(line).fails(2, &["is writing it"]);
+        drop(held);
+        work.wavesplat(line).ok();
+    }
+}

@@ -64,3 +64,22 @@ fn pictures_take_what_they_plan() {
         work.shell(&format!("{limit} exec $RENDER {command}")).ok();
     }
 }
+
+#[test]
+fn verifying_and_rewriting_keep_their_budget_or_refuse_it() {
+    let work = Work::new();
+    for (ty, size, options) in [("f32", 4, ""), ("u8", 1, ""), ("f32", 4, "--transfer-function rainbow --range 0,3")] {
+        let bytes: Vec<u8> =
+            (0..64 * 64 * 48 * 32 * size).map(|i| if i % 4 < 3 { (i % 251) as u8 } else { 63 }).collect();
+        work.write("a.raw", bytes);
+        let input = format!("a.raw --dims 64x64x48x32 --dtype {ty}");
+        work.wavesplat(&format!("convert {input} -o a.wspl --force --level 1 {options}")).ok();
+        for line in ["verify a.wspl --against a.raw", "verify a.wspl", "convert a.wspl -o b.wspl --force"] {
+            let memory = work.wavesplat(&format!("{line} --memory 1MiB")).fails(2, &["--memory"]).mebibytes();
+            assert!((20..400).contains(&memory), "{line}: {memory}");
+            let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+            work.shell(&format!("{limit} exec $WAVESPLAT {line} --threads 2 --memory {memory}MiB")).ok();
+            work.wavesplat(&format!("{line} --memory {}MiB", memory - 1)).fails(2, &["--memory"]);
+        }
+    }
+}

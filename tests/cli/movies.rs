@@ -78,3 +78,24 @@ fn a_failing_ffmpeg_leaves_no_file_and_is_quoted() {
     assert!(!run.status.success() && said.contains("disk is full of cats"), "{said}");
     assert_eq!(work.names(), ["a.npy", "a.wspl", "ffmpeg"]);
 }
+
+/// ffmpeg that creates its output late.
+const LATE: &str = "#!/bin/sh\nsleep 0.3\nfor last; do :; done\necho moving > \"$last\"\ncat > /dev/null\n";
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_interrupted_movie_leaves_no_file_whenever_ffmpeg_creates_it() {
+    let work = Work::with_file("");
+    work.write("ffmpeg", LATE);
+    work.shell("chmod +x ffmpeg").ok();
+    for ending in ["mp4", "webm", "gif"] {
+        let path = format!("PATH={}:/usr/bin:/bin", work.path("").display());
+        let movie = format!("env --default-signal=INT,TERM {path} $RENDER a.wspl --size 300x300 -o run.{ending} -q");
+        let part = format!("run.{ending}.part");
+        let wait = format!("while [ ! -e {part} ]; do sleep 0.01; done");
+        for name in ["INT", "TERM"] {
+            work.shell(&format!("{movie} & pid=$!; {wait}; kill -{name} $pid; wait $pid; sleep 0.5")).code.unwrap();
+            assert_eq!(work.names(), ["a.npy", "a.wspl", "ffmpeg"], "{name} {ending}");
+        }
+    }
+}

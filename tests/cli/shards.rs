@@ -139,6 +139,40 @@ fn an_interrupted_merge_is_resumed() {
 }
 
 #[test]
+fn resuming_a_complete_merge_does_nothing_and_succeeds() {
+    let work = work();
+    for (settings, of) in [("--range -2,3", 5), ("--max-error 0.02 --basis haar", 2)] {
+        shards(&work, settings, of);
+        let merge = "$WAVESPLAT merge $(ls -r part-*.wspl) -o merged.wspl";
+        work.shell(&format!("{merge} --resume")).ok();
+        let whole = work.read("merged.wspl");
+        let run = work.shell(&format!("{merge} --resume --json")).ok();
+        assert!(run.err.contains("merged.wspl: is complete already") && run.json()["frames"] == 80, "{}", run.err);
+        assert!(work.read("merged.wspl") == whole);
+        work.shell(merge).fails(2, &["exists already"]);
+        work.shell("rm part-*.wspl").ok();
+        shards(&work, "--range -3,3", of);
+        work.shell(&format!("{merge} --resume")).fails(2, &["is complete, but not of these shards", "--force"]);
+        assert!(work.read("merged.wspl") == whole);
+        work.shell("rm *.wspl").ok();
+    }
+}
+
+#[test]
+fn resuming_a_complete_merge_with_losses_still_tells_them() {
+    let work = work();
+    shards(&work, "--range -2,3", 5);
+    let merge = "$WAVESPLAT merge part-[1245].wspl -o merged.wspl --skip-damaged --resume";
+    let first = work.shell(merge).fails(3, &["with all of 2 windows of missing shards"]);
+    let whole = work.read("merged.wspl");
+    let again = work.shell(merge).fails(3, &["is complete already", "with all of 2 windows of missing shards"]);
+    assert!(work.read("merged.wspl") == whole);
+    let lost = |run: &super::Run| run.err.lines().last().unwrap().to_string();
+    assert_eq!(lost(&first), lost(&again));
+    work.shell("$WAVESPLAT merge part-*.wspl -o merged.wspl --resume").fails(2, &["not of these shards"]);
+}
+
+#[test]
 fn shards_of_archives_with_coordinates_and_dates() {
     let work = Work::new();
     let input = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/inputs/netcdf/netcdf4.nc");

@@ -5,8 +5,8 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::STANDARD;
-use wavesplat_engine::file::merge::{MergeReport, Shards};
-use wavesplat_engine::file::resume::{self, IfUnfinished};
+use wavesplat_engine::file::merge::{MergeReport, Merged, Shards};
+use wavesplat_engine::file::resume::IfUnfinished;
 
 /// Join shards into one coefficient file
 #[derive(Debug, Args)]
@@ -30,7 +30,8 @@ pub(crate) struct MergeArgs {
     /// Replace an existing file; discard what an earlier run left unfinished, unless --resume continues it
     #[arg(long)]
     force: bool,
-    /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run
+    /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run. Does
+    /// nothing if FILE is complete
     #[arg(long)]
     resume: bool,
     /// Keep all undamaged blocks, and mark damaged blocks and those of missing shards as lost. Exit code 3 if any are
@@ -45,16 +46,19 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     args.common.start()?;
     spare_inputs(&args.shards, &args.output)?;
     let shards = Shards::open(&args.shards, args.skip_damaged, &args.common.progress("open", "shards"))?;
-    let (mut out, begun) = resume::open(&args.output, args.force, IfUnfinished::from_flags(args.force, args.resume))?;
+    let if_unfinished = IfUnfinished::from_flags(args.force, args.resume);
     let progress = args.common.progress("merge", "windows");
-    let report = shards.merge(begun, args.skip_damaged, &args.output, &mut out, &progress)?;
-    out.commit_if(resume::check)?;
+    let merged = shards.merge_to_file(&args.output, args.force, if_unfinished, args.skip_damaged, &progress)?;
+    let Merged { report, was_complete } = merged;
     for shard in &report.unreadable {
         let what = "cannot be opened; wavesplat recover saves what is whole";
         args.common.note(format_args!("{}: {what}", shard.display()));
     }
     let MergeReport { shards, frames, output_bytes, blocks_lost, windows_lost, .. } = report;
-    args.common.note(format_args!("{shards} shards, {frames} frames, {output_bytes} bytes"));
+    match was_complete {
+        true => args.common.note(format_args!("{}: is complete already", args.output.display())),
+        false => args.common.note(format_args!("{shards} shards, {frames} frames, {output_bytes} bytes")),
+    }
     args.common.report(&report, args.output == Path::new(STANDARD))?;
     match blocks_lost {
         0 => Ok(()),

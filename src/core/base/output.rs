@@ -1,21 +1,28 @@
 //! Writes results to standard output, or to a file that gets its final name when it is complete.
 
+mod folder;
+mod lock;
 mod names;
+mod unfinished;
 
+pub use folder::{OutputFolder, Takes, commit_together};
 pub use names::Numbered;
 pub use names::names_of_views;
+pub use unfinished::{Helper, abandon};
 
 use crate::base::address::refuse_output;
 use crate::base::error::{Error, Note, Remedy, Result};
+use lock::locked;
 use std::ffi::OsString;
-use std::fs::{self, File, Permissions, TryLockError};
+use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use unfinished::AllUnfinished;
 
 /// The name that stands for a standard stream.
 pub const STANDARD: &str = "-";
@@ -52,35 +59,9 @@ struct Part {
 /// The work of at most this long is lost from a resumable file in a power failure.
 const BETWEEN_SYNCS: Duration = Duration::from_secs(2);
 
-/// How long to wait for a lock: a killed process may hold it a little longer.
-const LOCK_WAIT: Duration = Duration::from_secs(1);
-
-/// The unfinished files of this process, and whether each is to be kept, for [`abandon`].
-static PARTS: Mutex<UnfinishedFiles> = Mutex::new(Vec::new());
-
-type UnfinishedFiles = Vec<(PathBuf, Arc<AtomicBool>)>;
-
-fn parts() -> MutexGuard<'static, UnfinishedFiles> {
-    PARTS.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Removes all unfinished files except those that can be resumed, and returns the names of these. The process must then
-/// end: threads that commit or drop an output now wait forever.
-pub fn abandon() -> Vec<PathBuf> {
-    let parts = parts();
-    let is_kept = |keep: &AtomicBool| keep.load(Ordering::Relaxed);
-    for (path, _) in parts.iter().filter(|(_, keep)| !is_kept(keep)) {
-        let _ = fs::remove_file(path); // a failure cannot be reported here
-    }
-    let kept = parts.iter().filter(|(path, keep)| is_kept(keep) && path.exists());
-    let kept = kept.map(|(path, _)| path.clone()).collect();
-    std::mem::forget(parts);
-    kept
-}
-
 impl Drop for Part {
     fn drop(&mut self) {
-        parts().retain(|(path, _)| *path != self.path);
+        unfinished::forget(&self.path);
         if !self.is_kept() {
             let _ = fs::remove_file(&self.path); // a failure cannot be reported here
         }
@@ -144,6 +125,13 @@ impl Output {
         }
     }
 
+    /// Says that another program writes the unfinished file. It is ended before the file is removed.
+    pub fn set_helper(&self, helper: Helper) {
+        if let Some(part) = self.part() {
+            unfinished::set_helper(part, helper);
+        }
+    }
+
     /// Cuts an unfinished file to its first `bytes`, and continues writing after them.
     pub fn begin_at(&mut self, bytes: u64) -> Result<()> {
         let Target::File(part, file) = &mut self.target else { return Ok(()) };
@@ -189,16 +177,34 @@ impl Output {
     /// As [`Self::commit`], but first calls `right` with the unfinished file, which is then on disk. Its error prevents
     /// the commit.
     pub fn commit_if(mut self, right: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+        self.complete()?;
+        if let Some(part) = self.part() {
+            right(part)?;
+        }
+        self.rename(&unfinished::all())?;
+        self.sync_name()
+    }
+
+    /// Writes all that is held to the disk or the stream.
+    fn complete(&mut self) -> Result<()> {
         self.writer().flush().map_err(|e| Error::io(&self.path, "writing", e))?;
         if let Target::Memory(bytes, committed) = &mut self.target {
             let _ = committed.send(std::mem::take(&mut bytes.bytes)); // a receiver that is gone needs no bytes
         }
-        let Target::File(part, file) = &mut self.target else { return Ok(()) };
-        file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))?;
-        right(&part.path)?;
+        let Target::File(_, file) = &mut self.target else { return Ok(()) };
+        file.get_ref().sync_all().map_err(|e| Error::io(&self.path, "writing", e))
+    }
+
+    /// Gives a complete file its name.
+    fn rename(&self, all: &AllUnfinished) -> Result<()> {
+        let Target::File(part, _) = &self.target else { return Ok(()) };
         part.set_kept(true); // if renaming fails, the work must not be lost
         let doing = || format!("renaming the finished {} to this", part.path.display());
-        part.rename(&self.path).map_err(|e| Error::io(&self.path, doing(), e))?;
+        part.rename(&self.path, all).map_err(|e| Error::io(&self.path, doing(), e))
+    }
+
+    fn sync_name(&self) -> Result<()> {
+        let Target::File(..) = &self.target else { return Ok(()) };
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let synced = File::open(folder).and_then(|folder| folder.sync_all());
         synced.map_err(|e| Error::io(&self.path, "writing the name of the finished file to the disk", e))
@@ -206,9 +212,8 @@ impl Output {
 }
 
 impl Part {
-    fn new(path: PathBuf, replace: bool, mut parts: MutexGuard<'_, UnfinishedFiles>) -> Self {
-        let keep = Arc::new(AtomicBool::new(false));
-        parts.push((path.clone(), keep.clone()));
+    fn new(path: PathBuf, replace: bool, mut unfinished: AllUnfinished) -> Self {
+        let keep = unfinished::add(&path, &mut unfinished);
         Self { path, replace, resumable: false, keep, synced: Instant::now() }
     }
 
@@ -224,46 +229,26 @@ impl Part {
     fn create(path: &Path, replace: bool) -> Result<(File, Self)> {
         let part = part_of(path);
         let failed = |e| Error::io(path, "creating", e);
-        let asked = Instant::now();
+        let open = || File::options().read(true).write(true).create(true).truncate(false).open(&part);
         loop {
-            let parts = parts(); // `abandon` must know every file that is there
-            let file =
-                File::options().read(true).write(true).create(true).truncate(false).open(&part).map_err(failed)?;
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(TryLockError::WouldBlock) if asked.elapsed() < LOCK_WAIT => {
-                    drop(parts);
-                    std::thread::sleep(LOCK_WAIT / 20);
-                    continue;
-                }
-                Err(TryLockError::WouldBlock) => {
-                    let who = holder(&file).unwrap_or("another program".into());
-                    return Err(Error::path(path, format!("{who} is writing it")));
-                }
-                Err(TryLockError::Error(e)) if e.kind() == io::ErrorKind::Unsupported => {}
-                Err(TryLockError::Error(e)) => return Err(failed(e)),
+            let (file, unfinished) = locked(path, &part, open)?;
+            let own = file.metadata().map_err(failed)?;
+            if own.nlink() > 1 {
+                // Its owner was killed after it had linked the final name, but before it removed this one.
+                fs::remove_file(&part).map_err(failed)?;
+                continue;
             }
-            // Between opening and locking, the last owner may have renamed the file. Or it was killed after it had linked
-            // the final name, but before it removed this one.
-            let (own, there) = (file.metadata().map_err(failed)?, fs::metadata(&part));
-            let is_there = there.is_ok_and(|there| (there.dev(), there.ino()) == (own.dev(), own.ino()));
-            match (is_there, own.nlink() > 1) {
-                (true, true) => fs::remove_file(&part).map_err(failed)?,
-                (true, false) if path.exists() && !replace => {
-                    if file.metadata().is_ok_and(|m| m.len() == 0) {
-                        let _ = fs::remove_file(&part); // created here, and empty
-                    }
-                    return Err(exists(path));
+            if path.exists() && !replace {
+                if own.len() == 0 {
+                    let _ = fs::remove_file(&part); // created here, and empty
                 }
-                (true, false) => {
-                    if let Ok(replaced) = fs::metadata(path) {
-                        let mode = replaced.permissions().mode() | 0o200; // it must be writable
-                        file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
-                    }
-                    return Ok((file, Self::new(part, replace, parts)));
-                }
-                (false, _) => {}
+                return Err(exists(path));
             }
+            if let Ok(replaced) = fs::metadata(path) {
+                let mode = replaced.permissions().mode() | 0o200; // it must be writable
+                file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
+            }
+            return Ok((file, Self::new(part, replace, unfinished)));
         }
     }
 
@@ -279,8 +264,8 @@ impl Part {
         Ok(())
     }
 
-    fn rename(&self, path: &Path) -> io::Result<()> {
-        let _whole = parts(); // `abandon` must not run during this, nor this after it
+    /// `abandon` must not run during this, nor this after it.
+    fn rename(&self, path: &Path, _all: &AllUnfinished) -> io::Result<()> {
         if self.replace {
             return fs::rename(&self.path, path);
         }
@@ -346,17 +331,6 @@ pub fn part_of(path: &Path) -> PathBuf {
 
 fn exists(path: &Path) -> Error {
     Error::path(path, Note::with("exists already", Remedy::Replace))
-}
-
-/// The process that has locked a file, if the system tells.
-fn holder(file: &File) -> Option<String> {
-    let locks = fs::read_to_string("/proc/locks").ok()?;
-    let inode = format!(":{}", file.metadata().ok()?.ino());
-    let line =
-        locks.lines().find(|line| line.split_whitespace().nth(5).is_some_and(|place| place.ends_with(&inode)))?;
-    let process: u32 = line.split_whitespace().nth(4)?.parse().ok().filter(|process| *process > 0)?;
-    let name = fs::read_to_string(format!("/proc/{process}/comm")).unwrap_or_default();
-    Some(format!("process {process} ({})", name.trim()))
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::smoothness::{AXES, roughest_first};
 use super::spread::evenly;
 use super::{ConvertConfig, Pool};
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
@@ -92,6 +93,8 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) magnitude: f64,
     /// [`most_samples`]
     pub(super) most: usize,
+    /// Voxels a side of the file's blocks.
+    pub(super) edge: usize,
     /// How the file's codes are packed.
     pub(super) packing: Packing,
     /// The previous window's scheme, if the choice may start from it.
@@ -108,6 +111,8 @@ struct Sampled {
 
 /// A transform along time, and the transformed boxes.
 struct Transformed<'a, R> {
+    /// For the scheme that is tried now: making the functions of a long window takes longer than a trial.
+    codec: Mutex<WindowCodec>,
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
 }
@@ -119,26 +124,28 @@ struct Trials<'a, R> {
 }
 
 impl SchemeSelector<'_> {
-    /// The scheme that codes some boxes of the window in the fewest bytes. It does not depend on the number of threads.
-    pub(super) fn choose(&self) -> Result<Scheme> {
+    /// The codec of the scheme that codes some boxes of the window in the fewest bytes. It does not depend on the number
+    /// of threads.
+    pub(super) fn choose(&self) -> Result<WindowCodec> {
         if let SchemeConstraint { basis: Some(basis), space: SpatialPredictor::Alone } = self.config.coding
             && basis != Basis::Learned
         {
-            return Ok(Scheme::along_time(basis));
+            return Ok(self.codec(&Scheme::along_time(basis)));
         }
         if self.promise.delta <= 0.0 {
-            return Ok(Scheme::along_time(self.config.coding.basis.unwrap_or(Basis::Samples))); // all is stored exactly
+            let basis = self.config.coding.basis.unwrap_or(Basis::Samples);
+            return Ok(self.codec(&Scheme::along_time(basis))); // all is stored exactly
         }
         if self.config.coding.space == SpatialPredictor::Alone {
             let (basis, functions) = (Basis::Learned, self.functions()?);
             let coarseness = self.coarseness(COARSE);
-            return Ok(Scheme { functions, coarseness, ..Scheme::along_time(basis) });
+            return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
         if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() }
     }
 
     /// The smallest of all families with a pyramid and their variants.
-    fn smallest<R: Real + Send + Sync>(&self) -> Result<Scheme> {
+    fn smallest<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
         let boxes = self.boxes()?;
         let families = self.families(&self.order(&boxes))?;
         let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Pool::default() };
@@ -148,7 +155,7 @@ impl SchemeSelector<'_> {
         if let Some(before) = self.before {
             let best = promising.clone().reduce(fewer);
             if let Some((_, scheme)) = best.filter(|best| best.1.basis == before.basis) {
-                return Ok(scheme);
+                return Ok(self.finished(scheme, trials));
             }
         }
         let tuned = promising.map(|f| self.coarsest(f, &trials));
@@ -157,7 +164,19 @@ impl SchemeSelector<'_> {
             let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
             best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
         }
-        Ok(best.1)
+        Ok(self.finished(best.1, trials))
+    }
+
+    /// The codec of the chosen scheme.
+    fn finished<R>(&self, scheme: Scheme, trials: Trials<'_, R>) -> WindowCodec {
+        let of_basis = trials.boxes.into_iter().find(|b| b.basis == scheme.basis);
+        match of_basis {
+            Some(of_basis) => {
+                let codec = of_basis.codec.into_inner().unwrap_or_else(PoisonError::into_inner);
+                WindowCodec { scheme, ..codec }
+            }
+            None => self.codec(&scheme),
+        }
     }
 
     /// The boxes under each of the schemes' transforms along time.
@@ -171,7 +190,8 @@ impl SchemeSelector<'_> {
             if found.iter().all(|f| f.basis != scheme.basis) {
                 let codec = self.codec(scheme);
                 let trial = |b: &'a Sampled| Trial::new(&codec, b.size, b.outer, &b.samples);
-                found.push(Transformed { basis: scheme.basis, boxes: boxes.par_iter().map(trial).collect() });
+                let boxes = boxes.par_iter().map(trial).collect();
+                found.push(Transformed { basis: scheme.basis, boxes, codec: Mutex::new(codec) });
             }
         }
         found
@@ -272,7 +292,7 @@ impl SchemeSelector<'_> {
         let SchemeConstraint { basis, space } = self.config.coding;
         let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
-            None => (self.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
+            None => (self.frames() > 1 && self.can_learn()).then_some(Basis::Learned), // the others are never the smallest
             Some(Basis::Samples) => None,
             forced => forced,
         };
@@ -300,6 +320,13 @@ impl SchemeSelector<'_> {
             found.dedup();
         }
         Ok(found)
+    }
+
+    /// Whether learning takes less time than coding. Long functions of few voxels would take more bytes than they save,
+    /// too.
+    fn can_learn(&self) -> bool {
+        let (frames, voxels) = (self.frames(), self.archive.grid.dims.iter().product::<usize>() * self.channels.len());
+        frames <= QUICKLY_LEARNED || voxels.saturating_mul(VOXELS_LEARNED) >= frames.saturating_mul(frames)
     }
 
     /// The learned functions, from rows all over the volume instead of the boxes used for trials.
@@ -365,12 +392,14 @@ impl SchemeSelector<'_> {
 
     /// Estimates the bytes of the window.
     fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
-        let codec = self.codec(scheme);
         let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
         let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
+        let mut codec = of_basis.codec.lock().unwrap_or_else(PoisonError::into_inner);
+        codec.scheme = scheme.clone(); // with the same functions
+        let codec = &*codec;
         let bytes = |b: &Trial<'_, R>| {
             let mut scratch = trials.idle.take().unwrap_or_default();
-            let bytes = b.bytes(&codec, pyramid, &mut scratch);
+            let bytes = b.bytes(codec, pyramid, &mut scratch);
             trials.idle.put(scratch);
             (bytes, b.voxels())
         };
@@ -381,7 +410,7 @@ impl SchemeSelector<'_> {
 
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.frames();
-        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, EDGES[0]);
+        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, self.edge);
         codec.missing_value = self.config.missing_value;
         codec
     }
@@ -416,6 +445,13 @@ const LARGEST_SHARE: usize = 8;
 /// The number of rows that functions are learned from, and the number of the first position.
 const ROWS: usize = 64;
 const LEARNING: usize = 1000;
+
+/// Functions of windows up to this length are always learned. The time it takes grows with the cube of the length.
+const QUICKLY_LEARNED: usize = 128;
+
+/// A window of n frames needs n^2 divided by this many voxels, so that learning longer functions takes less time than
+/// coding.
+const VOXELS_LEARNED: usize = 64;
 
 /// A scheme is tuned only if its estimate is at most this many times the smallest.
 const PROMISING: f64 = 1.3;

@@ -22,12 +22,20 @@ use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::range_bound;
 use wavesplat_core::codec::encode::Encoded;
+use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan_frame};
 use wavesplat_core::source::{Archive, FrameSource, FrameWindow, read_frames_into};
 
 /// The largest number of blocks coded in a window, and of windows.
 const BLOCKS: usize = 24;
 const WINDOWS: usize = 3;
+
+/// The smallest number of blocks coded in a window, if it has them.
+const LEAST_BLOCKS: usize = 4;
+
+/// Archives of at most this many samples are estimated with the same care for every tolerance. For larger ones all
+/// estimates together take no longer than a conversion.
+const FEW_SAMPLES: usize = 1 << 22;
 
 /// The estimated size of an archive's coefficient file.
 #[derive(Debug, Clone, Serialize)]
@@ -72,7 +80,13 @@ pub fn estimates(
     let source_archive = Archive { description: None, ..source_archive }; // it is not of some blocks
     let first = CodedInput::new(config, &source_archive);
     let plan = Plan::new(&first)?;
-    let (blocks, windows) = (some_blocks(&plan.blocks), some_windows(frames, first.config.window));
+    let windows = some_windows(frames, first.config.window);
+    let is_rough = source_archive.grid.whole().voxels().saturating_mul(frames) > FEW_SAMPLES;
+    let all = plan.blocks.len().saturating_mul(frames.div_ceil(first.config.window));
+    let blocks = match is_rough {
+        true => some_blocks(&plan.blocks, blocks_of_window(all, windows.len() * configs.len())),
+        false => some_blocks(&plan.blocks, BLOCKS),
+    };
     progress.start(Some((windows.len() * configs.len()) as u64));
     let read = FramesRead {
         archive: &source_archive,
@@ -81,14 +95,15 @@ pub fn estimates(
         blocks: &blocks,
     };
     let (found, variation) = read.range(source, &windows)?;
+    let mut scheme = None;
     let mut estimated = |config: &ConvertConfig| {
         let mut input = CodedInput::new(config, &source_archive);
         let asked = input.clone();
         let plan = Plan::new(&asked)?;
         let range = *input.config.range.get_or_insert(found);
         let (config, archive) = (&input.config, &input.archive);
-        let coded = BlocksCoded { input: &input, plan: &plan, blocks: &blocks, range: found };
-        let bytes = scaled(coded.bytes(source, &windows, progress)?, &coded, &windows, frames);
+        let coded = BlocksCoded { input: &input, plan: &plan, blocks: &blocks, range: found, is_rough };
+        let bytes = scaled(coded.bytes(source, &windows, &mut scheme, progress)?, &coded, &windows, frames);
         let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
         let error = range_bound(config.tolerance, range);
         let lost = variation.share_below(error).filter(|_| input.colour_transform.is_none());
@@ -109,9 +124,14 @@ fn scaled(bytes: u64, coded: &BlocksCoded<'_>, windows: &[Range<usize>], frames:
     bytes as f64 * all / samples as f64
 }
 
-/// All blocks if they are few, else some, spread evenly over the volume.
-fn some_blocks(blocks: &BlockGrid) -> Vec<usize> {
-    if blocks.len() <= BLOCKS {
+/// The number of blocks to code in each of some windows, if those of an archive are `all`.
+fn blocks_of_window(all: usize, windows: usize) -> usize {
+    (all / windows.max(1)).clamp(LEAST_BLOCKS, BLOCKS)
+}
+
+/// All blocks if they are few, else up to `most`, spread evenly over the volume.
+fn some_blocks(blocks: &BlockGrid, most: usize) -> Vec<usize> {
+    if blocks.len() <= most {
         return (0..blocks.len()).collect();
     }
     let [nx, ny, nz] = blocks.counts();
@@ -119,7 +139,7 @@ fn some_blocks(blocks: &BlockGrid) -> Vec<usize> {
         let [x, y, z] = evenly(number, [nx, ny, nz]);
         x + nx * (y + ny * z)
     };
-    (0..BLOCKS).map(block).collect::<BTreeSet<_>>().into_iter().collect()
+    (0..most).map(block).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// The frames of all windows if they are few, else of some full ones, evenly spaced.
@@ -189,20 +209,32 @@ struct BlocksCoded<'a> {
     blocks: &'a [usize],
     /// The value range that was found.
     range: (f64, f64),
+    /// Whether schemes are chosen with less care.
+    is_rough: bool,
 }
 
 impl BlocksCoded<'_> {
-    /// The bytes of a file of these blocks in these windows.
-    fn bytes(&self, source: &mut dyn FrameSource, windows: &[Range<usize>], progress: &dyn Progress) -> Result<u64> {
+    /// The bytes of a file of these blocks in these windows. Rough choices begin with `scheme`, and leave the last one.
+    fn bytes(
+        &self,
+        source: &mut dyn FrameSource,
+        windows: &[Range<usize>],
+        scheme: &mut Option<Scheme>,
+        progress: &dyn Progress,
+    ) -> Result<u64> {
         let started = Instant::now();
         let plan = self.plan.for_blocks(self.blocks.len());
         let target = Target { name: Path::new("estimate"), out: io::sink(), resume_from: None };
         let mut file = WindowWriter::new(self.input, &plan, target);
         let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
         let mut reader = WindowReader::new(self.input, self.plan, &done, &idle);
+        if self.is_rough {
+            reader.choose_roughly(scheme.take());
+        }
         for (index, frames) in windows.iter().enumerate() {
             let window = source.window(frames.start, frames.len())?;
             let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range: self.range, ..Scan::NOTHING })?);
+            *scheme = Some(job.codec.scheme.clone());
             for batch in self.batches(&reader, window.as_ref(), &job) {
                 let encoded = encode_batch(self.input.config.level, self.plan, &encoders, &idle, batch?)?;
                 file.append(&self.renumbered(encoded))?;
@@ -245,11 +277,22 @@ mod tests {
 
     #[test]
     fn places_spread_evenly() {
-        assert_eq!(some_blocks(&BlockGrid::cubes([30, 20, 10], 10)), [0, 1, 2, 3, 4, 5]);
-        let blocks = some_blocks(&BlockGrid::cubes([100, 100, 100], 10));
+        assert_eq!(some_blocks(&BlockGrid::cubes([30, 20, 10], 10), BLOCKS), [0, 1, 2, 3, 4, 5]);
+        let blocks = some_blocks(&BlockGrid::cubes([100, 100, 100], 10), BLOCKS);
         assert!((20..=BLOCKS).contains(&blocks.len()) && blocks.is_sorted() && blocks[0] < 250 && blocks[19] >= 750);
+        assert_eq!(some_blocks(&BlockGrid::cubes([100, 100, 100], 10), LEAST_BLOCKS).len(), LEAST_BLOCKS);
         assert_eq!(some_windows(70, 32), [0..32, 32..64, 64..70]);
         assert_eq!(some_windows(100, 32), [0..32, 32..64, 64..96]);
         assert_eq!(some_windows(640, 32), [96..128, 320..352, 512..544]);
+    }
+
+    #[test]
+    fn estimates_together_code_no_more_blocks_than_a_conversion() {
+        for all in [54, 200, 1000, 5000] {
+            for windows in [2, 10, 15] {
+                assert!(blocks_of_window(all, windows) * windows <= all.max(LEAST_BLOCKS * windows));
+            }
+        }
+        assert_eq!((blocks_of_window(54, 2), blocks_of_window(54, 10), blocks_of_window(5000, 15)), (24, 5, BLOCKS));
     }
 }

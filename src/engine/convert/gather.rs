@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, join_ranges};
-use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::bound::{self, Bound, ErrorBound};
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan};
@@ -75,6 +74,9 @@ pub(super) fn read(
     Ok((busy, reader.findings))
 }
 
+/// The samples that a scheme is chosen from are divided by this, if it need not be the best.
+const ROUGH: usize = 4;
+
 pub(super) struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
@@ -93,6 +95,8 @@ pub(super) struct WindowReader<'a> {
     findings: Findings,
     /// The scheme of the window before.
     scheme: Option<Scheme>,
+    /// Whether schemes are chosen with less care, for an estimate.
+    is_rough: bool,
     /// The number of frames in the file so far.
     frames: u64,
     /// Frames of the file that precede the source's first frame.
@@ -122,9 +126,15 @@ impl<'a> WindowReader<'a> {
             features,
             findings: Findings::default(),
             scheme,
+            is_rough: false,
             frames: 0,
             before: 0,
         }
+    }
+
+    /// Chooses schemes from fewer samples, each beginning with the one before; the first with `scheme`.
+    pub(super) fn choose_roughly(&mut self, scheme: Option<Scheme>) {
+        (self.is_rough, self.scheme) = (true, scheme);
     }
 
     /// The next frames of the source, at most `count`; none at its end.
@@ -203,7 +213,7 @@ impl<'a> WindowReader<'a> {
 
     /// Fixes the error bound of a window and chooses its scheme, from what a scan saw.
     pub(super) fn job(&mut self, window: &dyn FrameWindow, index: usize, scan: &Scan) -> Result<WindowJob> {
-        let (config, ty, first) = (self.config, self.archive.sample, self.first());
+        let (config, first) = (self.config, self.first());
         let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { scan.range };
         let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
@@ -216,23 +226,22 @@ impl<'a> WindowReader<'a> {
         let delta = self.delta(&channels, of_window, range)?;
         let promise = ErrorBound { bound: config.bound, tolerance: config.tolerance, delta };
         let magnitude = sample::magnitude(of_window);
-        let before =
-            self.scheme.as_ref().filter(|scheme| !index.is_multiple_of(config.chain) && scheme.pyramid.is_some());
+        let goes_on = self.is_rough || !index.is_multiple_of(config.chain);
+        let before = self.scheme.as_ref().filter(|scheme| goes_on && scheme.pyramid.is_some());
         let most = most_samples(self.plan.blocks.region(0).voxels() * window.frames());
-        let scheme = SchemeSelector {
+        let selector = SchemeSelector {
             config,
             archive: self.archive,
             channels: &channels,
             promise,
             magnitude,
-            most,
+            most: if self.is_rough { most / ROUGH } else { most },
+            edge: self.plan.blocks.edges[0],
             packing: self.features.packing,
             before,
         };
-        let scheme = scheme.choose()?;
-        self.scheme = Some(scheme.clone());
-        let mut codec = WindowCodec::new(scheme, window.frames(), ty, promise, self.plan.blocks.edges[0]);
-        codec.missing_value = config.missing_value;
+        let mut codec = selector.choose()?;
+        self.scheme = Some(codec.scheme.clone());
         codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
         self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
         let id = self.id(scan.digest)?;

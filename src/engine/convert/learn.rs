@@ -11,6 +11,8 @@
 //! No other K functions leave a smaller sum of squares of these series. A function is kept if its coefficients have a
 //! root mean square above delta / 4: below that, nearly all codes would be zero.
 
+mod thin;
+
 use wavesplat_core::base::sample::{self, SampleType};
 use wavesplat_core::codec::bound::ErrorBound;
 use wavesplat_core::wavelet::Learned;
@@ -31,16 +33,24 @@ pub(super) fn learned_functions<'a>(
         products.add(&values, missing_value);
     }
     let Some(scale) = products.scale() else { return Vec::new() };
-    let (energies, rows) = eigen(products.matrix.clone(), frames);
     let small = promise.delta / 4.0 / scale;
-    let matters = |energy: f64| energy / products.series as f64 > small * small;
+    let least = small * small * products.series as f64;
+    let (energies, rows) = match frames {
+        ..=MOST_ROTATED => eigen(products.whole(), frames),
+        _ => thin::eigen(&products.whole(), frames, least),
+    };
+    let matters = |energy: f64| energy > least;
     let kept = energies.iter().zip(&rows).take_while(|(energy, _)| matters(**energy));
     kept.flat_map(|(_, row)| Learned::quantise(row).collect::<Vec<_>>()).collect()
 }
 
+/// The longest window whose whole matrix is rotated: that takes a time of the cube of its length, many times over.
+const MOST_ROTATED: usize = 128;
+
 /// Sums over series of the products of samples at two frames, in units of the largest sample so far.
 struct Products {
     frames: usize,
+    /// The lower half, with the diagonal.
     matrix: Vec<f64>,
     series: usize,
     magnitude: f64,
@@ -80,9 +90,15 @@ impl Products {
 
     fn add_series(&mut self, series: &[f64]) {
         self.series += 1;
-        for (row, a) in self.matrix.chunks_exact_mut(self.frames).zip(series) {
-            row.iter_mut().zip(series).for_each(|(m, b)| *m += a * b);
+        for (t, (row, a)) in self.matrix.chunks_exact_mut(self.frames).zip(series).enumerate() {
+            row[..=t].iter_mut().zip(series).for_each(|(m, b)| *m += a * b);
         }
+    }
+
+    /// The matrix with both of its halves.
+    fn whole(&self) -> Vec<f64> {
+        let n = self.frames;
+        (0..n * n).map(|i| (i / n, i % n)).map(|(i, j)| self.matrix[i.max(j) * n + i.min(j)]).collect()
     }
 
     /// The unit; none if there are no series.

@@ -57,7 +57,7 @@ pub(super) fn fill(extreme: &Extreme, samples: u64, ty: SampleType, allowed: Opt
 /// All that is worth a warning.
 pub(super) fn warnings(config: &ConvertConfig, report: &ConvertReport, found: &Findings) -> Vec<Note> {
     let small = small_changes(config, report, found.variation.median());
-    let of_file = larger_than_samples(config, report).or_else(|| short_windows(config, report));
+    let of_file = short_windows(config, report).or_else(|| larger_than_samples(config, report));
     let negative = negative_samples(config, report, found.range);
     found.fill.clone().into_iter().chain(small).chain(negative).chain(of_file).collect()
 }
@@ -130,13 +130,14 @@ fn larger_than_samples(config: &ConvertConfig, report: &ConvertReport) -> Option
 fn short_windows(config: &ConvertConfig, report: &ConvertReport) -> Option<Note> {
     let frame = report.samples / report.frames.max(1);
     let suits = |window: &u64| 2 * window <= report.frames && window * frame <= MOST_SAMPLES;
-    let longer = [32, 64, 128].into_iter().rfind(suits).filter(|window| *window > config.window as u64)?;
+    let longer = [32, 64, 128, 256, 512].into_iter().rfind(suits).filter(|window| *window > config.window as u64)?;
     let each = report.output_bytes / report.windows as u64;
     if each > FEW_BYTES || report.windows < 4 || config.coding.basis == Some(Basis::Multi) {
         return None;
     }
+    let larger = if report.output_bytes > report.input_bytes { "the file is larger than the samples: " } else { "" };
     let what = format!(
-        "a window of {} frames takes {each} bytes, much of it to describe the window; longer ones share that",
+        "{larger}a window of {} frames takes {each} bytes, much of it to describe the window; longer ones share that",
         config.window
     );
     Some(Note::with(what, Remedy::Try("window", longer.to_string())))

@@ -1,6 +1,10 @@
 //! Shards of an archive, merged over time: the windows of one file after those of another. Blocks are copied as they are
 //! stored, with new checksums; nothing is coded anew. The merged file has the bytes of one conversion.
 
+mod to_file;
+
+pub use to_file::Merged;
+
 use super::CoefficientFile;
 use super::shard::{SHARD, ShardRange, without_shard};
 use serde::Serialize;

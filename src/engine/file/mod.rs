@@ -6,6 +6,7 @@
 mod counted;
 mod detail;
 pub mod promise;
+mod budget;
 mod decoded;
 mod coefficient_file;
 mod fetch;

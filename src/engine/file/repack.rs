@@ -1,12 +1,12 @@
 //! A coefficient file of an older version as one of this version. Codes are packed anew; no value changes.
 
 use super::CoefficientFile;
+use super::budget::blocks_within;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::memory::MOST_BLOCKS;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::encode::Encoder;
@@ -26,10 +26,10 @@ pub struct RepackReport {
 }
 
 /// Writes `file` to `out` as this version packs codes, with a zstd level. All samples, bounds and statistics stay as they
-/// are. Messages call the new file `name`; `memory` is what may be allocated, if it is enough for one block.
+/// are. Messages call the new file `name`; `memory` is what may be allocated.
 ///
 /// # Errors
-/// A block is damaged, or `out` cannot be written.
+/// `memory` is too small for a block, a block is damaged, or `out` cannot be written.
 pub fn repack(
     file: &CoefficientFile,
     level: i32,
@@ -45,7 +45,7 @@ pub fn repack(
     let features = Features { packing: metadata.packing(), described: description.is_some() };
     let id = metadata.file_id(first_digest, features).map_err(failed)?;
     let mut writer = Writer::with_features(out, id, &metadata, features).map_err(failed)?;
-    let at_once = (memory / file.block_bytes()).clamp(1, MOST_BLOCKS);
+    let at_once = blocks_within(memory, 0, file.block_bytes(), "rewriting")?;
     progress.start(Some(metadata.blocks()));
     for number in 0..metadata.windows.len() as u32 {
         let to = WindowCodec::from_metadata(&metadata, &metadata.windows[number as usize]).map_err(failed)?;

@@ -1,13 +1,13 @@
 //! Verifies that a coefficient file is intact, and that it keeps its error bound.
 
 use crate::file::CoefficientFile;
+use crate::file::budget::blocks_within;
 use rayon::prelude::*;
 use serde::Serialize;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
-use wavesplat_core::base::memory::MOST_BLOCKS;
 use wavesplat_core::base::progress::Progress;
-use wavesplat_core::base::sample::{self, join_ranges};
+use wavesplat_core::base::sample::{self, SampleType, join_ranges};
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::bound;
 use wavesplat_core::codec::decode::Block;
@@ -134,8 +134,10 @@ impl Comparison {
 }
 
 /// Checks every byte of the file, also after finding damage, and with a source every sample. The source must have the
-/// frames and the region that were converted. `memory` is the number of bytes that may be allocated; at least one block
-/// is decoded at a time.
+/// frames and the region that were converted. `memory` is the number of bytes that may be allocated.
+///
+/// # Errors
+/// `memory` is too small for a block, the source has another shape, or something cannot be read.
 pub fn verify(
     file: &CoefficientFile,
     mut source: Option<&mut dyn FrameSource>,
@@ -146,9 +148,8 @@ pub fn verify(
     if let Some(source) = &source {
         same_shape(file, *source)?;
     }
-    // The samples of the source and the extracted ones, each in their type and as f64, and the splatted values as f64.
-    let block_bytes = file.block_bytes() + file.largest_block() * (2 * file.sample().size() + 3 * size_of::<f64>());
-    let at_once = (memory / block_bytes).clamp(1, MOST_BLOCKS);
+    let held = source.as_ref().map_or(0, |source| source.archive().memory);
+    let at_once = blocks_within(memory, held, bytes_of_block(file, source.is_some()), "verifying")?;
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
     file.check_structure(&mut |wrong| report.damage(&wrong))?;
     let (mut all, mut fetched) = (Comparison::default(), 0);
@@ -189,6 +190,13 @@ pub fn verify(
         report.against = Some(all);
     }
     Ok(report)
+}
+
+/// Bytes to check a block, and to compare it: the samples of the source, also before they became colours, and the
+/// extracted ones, and the splatted values.
+fn bytes_of_block(file: &CoefficientFile, is_compared: bool) -> usize {
+    let compared = file.of_source().0.size() + 2 * file.sample().size() + size_of::<f64>();
+    file.block_bytes() + if is_compared { file.largest_block() * compared } else { 0 }
 }
 
 fn same_shape(file: &CoefficientFile, source: &dyn FrameSource) -> Result<()> {
@@ -272,26 +280,26 @@ fn compare(
     let size = codec.sample.size();
     let samples = original.len() / size;
     let voxels = samples / codec.frames();
-    let mut source = vec![0.0; samples];
-    sample::load(codec.sample, original, &mut source);
     let (bytes, splatted) = decoded.samples_and_values(codec);
-    let mut extracted = vec![0.0; samples];
-    sample::load(codec.sample, &bytes, &mut extracted);
     let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
     let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+    let (mut source, mut extracted) = (Series::new(codec), Series::new(codec));
     for voxel in 0..voxels {
-        let errors: Vec<(f64, f64)> = (voxel..samples)
-            .step_by(voxels)
-            .map(|i| {
-                let missing = codec.is_missing(source[i]);
+        let (source, extracted) = (source.load(original, voxel), extracted.load(&bytes, voxel));
+        let errors: Vec<(f64, f64)> = source
+            .iter()
+            .zip(extracted)
+            .zip((voxel..samples).step_by(voxels))
+            .map(|((source, extracted), i)| {
+                let missing = codec.is_missing(*source);
                 found.missing += u64::from(missing && same(i));
                 match missing {
                     true if same(i) => (0.0, 0.0),
                     true => (f64::INFINITY, 0.0),
                     false => {
-                        range = join_ranges(range, (extracted[i], extracted[i]));
-                        (codec.error(splatted[i], extracted[i], source[i]), codec.bound.allowed(source[i]))
+                        range = join_ranges(range, (*extracted, *extracted));
+                        (codec.error(splatted[i], *extracted, *source), codec.bound.allowed(*source))
                     }
                 }
             })
@@ -299,6 +307,31 @@ fn compare(
         add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
     }
     (found, range)
+}
+
+/// The samples of one voxel.
+struct Series {
+    ty: SampleType,
+    bytes: Vec<u8>,
+    values: Vec<f64>,
+}
+
+impl Series {
+    fn new(codec: &WindowCodec) -> Self {
+        let (ty, frames) = (codec.sample, codec.frames());
+        Self { ty, bytes: vec![0; frames * ty.size()], values: vec![0.0; frames] }
+    }
+
+    /// Loads the series of a voxel of a block.
+    fn load(&mut self, block: &[u8], voxel: usize) -> &[f64] {
+        let (size, frames) = (self.ty.size(), self.values.len());
+        let frame = block.len() / frames;
+        for (sample, frame) in self.bytes.chunks_exact_mut(size).zip(block.chunks_exact(frame)) {
+            sample.copy_from_slice(&frame[voxel * size..][..size]);
+        }
+        sample::load(self.ty, &self.bytes, &mut self.values);
+        &self.values
+    }
 }
 
 /// Adds the errors of a series, each with what is allowed.

@@ -5,15 +5,14 @@ use super::store::{LEVEL, Store};
 use crate::contents::Contents;
 use crate::encoding::Encoding;
 use crate::writer::SampleSink;
-use std::fs;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
+use wavesplat_core::base::output::{OutputFolder, Takes};
 
 /// A store that is being written.
 #[derive(Debug)]
 struct StoreSink {
-    folder: PartialFolder,
+    folder: OutputFolder,
     store: Store,
     encoding: Encoding,
     /// Name and samples of the chunks that are left, the next one last.
@@ -27,7 +26,7 @@ struct StoreSink {
 pub(super) fn create(path: &Path, contents: &Contents, encoding: Encoding, force: bool) -> Result<Box<dyn SampleSink>> {
     check(path, force)?;
     let store = Store::new(contents, encoding.to);
-    let folder = PartialFolder::create(path)?;
+    let folder = OutputFolder::create(path, GROUP, Takes::Whole, force)?;
     for (name, bytes) in &store.files {
         folder.write(name, bytes)?;
     }
@@ -42,7 +41,7 @@ impl SampleSink for StoreSink {
             let wanted = *count as usize * self.encoding.to.size() - self.bytes.len();
             let take = (wanted / self.encoding.to.size() * self.encoding.from.size()).min(samples.len());
             let (these, others) = samples.split_at(take);
-            let failed = |e| Error::io(&self.folder.path, "writing", e);
+            let failed = |e| Error::io(self.folder.path(), "writing", e);
             self.encoding.write(these, &mut self.bytes).map_err(failed)?;
             samples = others;
             if *count as usize * self.encoding.to.size() == self.bytes.len() {
@@ -54,8 +53,9 @@ impl SampleSink for StoreSink {
 
     /// Gives the store its name.
     fn finish(self: Box<Self>) -> Result<()> {
-        self.folder.write(Path::new(METADATA), &self.store.metadata)?;
-        self.folder.commit(self.force)
+        self.folder.write(METADATA, &self.store.metadata)?;
+        check(self.folder.path(), self.force)?; // another may have come meanwhile
+        self.folder.commit()
     }
 }
 
@@ -65,9 +65,9 @@ impl StoreSink {
         let Some((name, _)) = self.chunks.pop() else { return Ok(()) };
         self.bytes.resize(self.store.chunks.samples() as usize * self.encoding.to.size(), 0);
         let packed = zstd::bulk::compress(&self.bytes, LEVEL);
-        let packed = packed.map_err(|e| Error::io(&self.folder.path, "compressing", e))?;
+        let packed = packed.map_err(|e| Error::io(self.folder.path(), "compressing", e))?;
         self.bytes.clear();
-        self.folder.write(&self.store.samples.join(name), &packed)
+        self.folder.write(self.store.samples.join(name), &packed)
     }
 }
 
@@ -85,51 +85,4 @@ fn check(path: &Path, force: bool) -> Result<()> {
 
 fn is_store(path: &Path) -> bool {
     path.join(GROUP).is_file()
-}
-
-/// A folder that is removed on drop unless it is committed.
-#[derive(Debug)]
-struct PartialFolder {
-    path: PathBuf,
-    part: PathBuf,
-}
-
-impl PartialFolder {
-    fn create(path: &Path) -> Result<Self> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        match fs::create_dir(&part) {
-            Ok(()) => Ok(Self { path: path.into(), part }),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
-                let what = "is in the way: it is that of another run, or of one that was killed; remove it";
-                Err(Error::path(part, what))
-            }
-            Err(e) => Err(Error::io(part, "creating the folder", e)),
-        }
-    }
-
-    fn write(&self, name: &Path, bytes: &[u8]) -> Result<()> {
-        let path = self.part.join(name);
-        let failed = |e| Error::io(&path, "writing", e);
-        path.parent().map_or(Ok(()), fs::create_dir_all).map_err(failed)?;
-        let mut file = fs::File::create(&path).map_err(failed)?;
-        file.write_all(bytes).map_err(failed)
-    }
-
-    /// Gives the folder its name. With `force` a store of that name is removed first.
-    fn commit(self, force: bool) -> Result<()> {
-        check(&self.path, force)?;
-        let failed = |e| Error::io(&self.path, "replacing", e);
-        if is_store(&self.path) {
-            fs::remove_dir_all(&self.path).map_err(failed)?;
-        }
-        fs::rename(&self.part, &self.path).map_err(failed)
-    }
-}
-
-impl Drop for PartialFolder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.part); // it is gone if it was committed
-    }
 }

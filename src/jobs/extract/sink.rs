@@ -3,11 +3,10 @@
 use super::{Contents, SampleFormat};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::output::{Numbered, Output, STANDARD};
+use wavesplat_core::base::output::{Numbered, Output, OutputFolder, STANDARD, Takes, commit_together};
 use wavesplat_formats::encoding::Encoding;
 use wavesplat_formats::writer::{OutputFiles, SampleSink, Samples, Writer};
 
@@ -94,27 +93,6 @@ fn no_folder(path: &Path) -> Error {
     Error::path(path, "is a file, but the files of frames need a folder of this name")
 }
 
-/// A folder created for files; it is removed on drop if it is empty.
-#[derive(Debug)]
-struct Folder(PathBuf);
-
-impl Folder {
-    /// Creates the folder; none if it exists already.
-    fn create(path: &Path) -> Result<Option<Self>> {
-        match fs::create_dir(path) {
-            Ok(()) => Ok(Some(Self(path.into()))),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Ok(None),
-            Err(e) => Err(Error::io(path, "creating the folder", e)),
-        }
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir(&self.0); // fails if the folder is not empty
-    }
-}
-
 /// An output, perhaps in gzip.
 #[derive(Debug)]
 enum Stream {
@@ -193,14 +171,21 @@ struct FileSink<'a> {
     left: u64,
     /// The number of files of samples begun.
     begun: usize,
-    _folder: Option<Folder>, // dropped after the open file
+    /// The complete file of samples, until its header is there too.
+    complete: Option<Output>,
+    /// The folder of the files of a list.
+    folder: Option<OutputFolder>, // dropped after the open file
 }
+
+/// The file that says that an unfinished folder of files is ours.
+const MARKER: &str = ".unfinished";
 
 impl<'a> FileSink<'a> {
     fn create(files: Files, contents: &'a Contents, encoding: Encoding, force: bool) -> Result<Self> {
         files.check(force)?;
-        let folder = files.folder().map(Folder::create).transpose()?.flatten();
-        let mut sink = Self { contents, files, force, encoding, open: None, left: 0, begun: 0, _folder: folder };
+        let folder = files.folder().map(|path| OutputFolder::create(path, MARKER, Takes::Files, force)).transpose()?;
+        folder.iter().try_for_each(|folder| folder.write(MARKER, b""))?;
+        let mut sink = Self { contents, files, force, encoding, open: None, left: 0, begun: 0, complete: None, folder };
         sink.begin()?;
         Ok(sink)
     }
@@ -230,14 +215,14 @@ impl SampleSink for FileSink<'_> {
         let Some(path) = &self.files.last else { return Ok(()) };
         let mut out = Output::create(path, self.force)?;
         self.write_last(&mut out).map_err(|e| Error::io(path, "writing", e))?;
-        out.commit()
+        commit_together(self.folder.take(), self.complete.take().into_iter().chain([out]).collect())
     }
 }
 
 impl FileSink<'_> {
     /// Opens the next file and writes its header.
     fn begin(&mut self) -> Result<()> {
-        let path = &self.files.samples[self.begun];
+        let path = &self.place(&self.files.samples[self.begun]);
         let frames = self.contents.frames.len() / self.files.samples.len();
         let mut out = Stream::new(Output::create(path, self.force)?, self.writer().gzip);
         (self.writer().before)(self.contents, self.samples(self.begun), &mut out)
@@ -253,7 +238,17 @@ impl FileSink<'_> {
         let end = (self.writer().after)(self.contents, self.samples(self.begun - 1));
         let failed = |e| Error::io(&self.files.samples[self.begun - 1], "writing", e);
         out.write_all(&end).map_err(failed)?;
-        out.finish().map_err(failed)?.commit()
+        let out = out.finish().map_err(failed)?;
+        match self.writer().files {
+            OutputFiles::WithHeader { .. } => self.complete = Some(out),
+            _ => out.commit()?,
+        }
+        Ok(())
+    }
+
+    /// Where a file is written: those of a list are in another folder until all are there.
+    fn place(&self, path: &Path) -> PathBuf {
+        self.folder.as_ref().map_or(path.into(), |folder| folder.place(path.file_name().unwrap_or_default()))
     }
 
     fn writer(&self) -> &'static Writer {

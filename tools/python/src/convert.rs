@@ -14,7 +14,7 @@ use wavesplat::Result;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{ConvertRequest, run};
 use wavesplat::file::merge::Shards;
-use wavesplat::file::resume::{self, IfUnfinished};
+use wavesplat::file::resume::IfUnfinished;
 use wavesplat::formats::{self, NamedArrays};
 use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
 
@@ -140,9 +140,8 @@ pub(crate) fn merge(
 ) -> PyResult<String> {
     job::run(py, report_to.as_ref(), |progress, _| {
         let shards = Shards::open(&shards, false, progress)?;
-        let (mut out, begun) = resume::open(&path, overwrite, IfUnfinished::from_flags(overwrite, resume))?;
-        let report = shards.merge(begun, false, &path, &mut out, progress)?;
-        out.commit_if(resume::check)?;
-        Ok(serde_json::to_string(&report).unwrap_or_default())
+        let if_unfinished = IfUnfinished::from_flags(overwrite, resume);
+        let merged = shards.merge_to_file(&path, overwrite, if_unfinished, false, progress)?;
+        Ok(serde_json::to_string(&merged.report).unwrap_or_default())
     })
 }

@@ -3,10 +3,12 @@
 use super::{Picture, Rendered, SinkConfig};
 use std::io::{self, Read, Write};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{ChildStdin, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::output::Output;
+use wavesplat_core::base::output::{Helper, Output};
 
 /// The kinds of movies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,6 +27,9 @@ const TO_VIDEO: &str = "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt7
 const TO_GIF: &str = "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=sierra2_4a";
 /// Tags that tell players the colour space.
 const TAGS: [&str; 6] = ["-color_primaries", "bt709", "-color_trc", "bt709", "-colorspace", "bt709"];
+
+/// How often to look whether ffmpeg has ended.
+const WAIT: Duration = Duration::from_millis(5);
 
 /// The longest comment, in letters.
 const MOST_COMMENT: usize = 2000;
@@ -52,7 +57,9 @@ impl MovieFormat {
 /// A movie in work. If it is dropped, no file remains.
 pub(super) struct Movie {
     out: Output,
-    ffmpeg: Child,
+    ffmpeg: Helper,
+    /// Takes the pictures; none once they have ended.
+    pictures: Option<ChildStdin>,
     /// Reads ffmpeg's messages, so that it never waits for a reader.
     messages: JoinHandle<String>,
 }
@@ -69,7 +76,10 @@ impl Movie {
         let mut ffmpeg = command(part, format, config).spawn().map_err(|e| not_started(out.path(), e))?;
         let stderr = ffmpeg.stderr.take();
         let messages = thread::spawn(move || stderr.map(last_of).unwrap_or_default());
-        Ok(Self { out, ffmpeg, messages })
+        let pictures = ffmpeg.stdin.take();
+        let ffmpeg = Arc::new(Mutex::new(ffmpeg));
+        out.set_helper(ffmpeg.clone());
+        Ok(Self { out, ffmpeg, pictures, messages })
     }
 
     /// Sends one picture.
@@ -80,7 +90,7 @@ impl Movie {
         picture: Picture<'_>,
     ) -> io::Result<()> {
         let image = config.image(rendered, picture);
-        self.ffmpeg.stdin.as_mut().map_or(Ok(()), |stdin| stdin.write_all(image.as_flattened()))
+        self.pictures.as_mut().map_or(Ok(()), |pictures| pictures.write_all(image.as_flattened()))
     }
 
     /// Waits for ffmpeg, and gives the file its final name.
@@ -88,18 +98,27 @@ impl Movie {
     /// # Errors
     /// ffmpeg failed, or the file cannot be renamed.
     pub(super) fn finish(mut self) -> Result<()> {
-        drop(self.ffmpeg.stdin.take());
-        let ended = self.ffmpeg.wait().map_err(|e| Error::io(self.out.path(), "waiting for ffmpeg", e))?;
+        let ended = self.wait().map_err(|e| Error::io(self.out.path(), "waiting for ffmpeg", e))?;
         if !ended.success() {
             return Err(self.failed());
         }
         self.out.commit()
     }
 
+    /// Waits for ffmpeg to end, but without holding it: a signal must still be able to end it.
+    fn wait(&mut self) -> io::Result<ExitStatus> {
+        drop(self.pictures.take());
+        loop {
+            if let Some(ended) = self.ffmpeg.lock().unwrap_or_else(PoisonError::into_inner).try_wait()? {
+                return Ok(ended);
+            }
+            thread::sleep(WAIT);
+        }
+    }
+
     /// The error with ffmpeg's own words.
     pub(super) fn failed(mut self) -> Error {
-        drop(self.ffmpeg.stdin.take());
-        let _ = self.ffmpeg.wait(); // its messages end then
+        let _ = self.wait(); // its messages end then
         let said = self.messages.join().unwrap_or_default();
         let said = if said.trim().is_empty() { "it ended early and says nothing".into() } else { said };
         Error::path(self.out.path(), format!("ffmpeg failed: {}", said.trim()))

@@ -1,0 +1,37 @@
+//! Memory budgets of commands that work on some blocks at a time.
+
+use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::memory::{FIXED, MOST_BLOCKS};
+
+/// The number of blocks that fit, if each takes `block` bytes of `memory`, of which a source takes `held`, a share.
+///
+/// # Errors
+/// Not even one fits; `doing` names the work.
+pub(super) fn blocks_within(memory: usize, held: usize, block: usize, doing: &str) -> Result<usize> {
+    let available = memory.saturating_sub(held.saturating_add(FIXED));
+    if available < block {
+        let share = memory as f64 / memory.saturating_sub(held).max(1) as f64;
+        let least = ((block + FIXED) as f64 * share / f64::from(1 << 20)).ceil();
+        return Err(Error::setting("memory", format!("{doing} this file needs at least {least}MiB")));
+    }
+    Ok((available / block.max(1)).clamp(1, MOST_BLOCKS))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_without_room_for_a_block_is_refused_with_one_that_suffices() {
+        const MIB: usize = 1 << 20;
+        assert_eq!(blocks_within(108 * MIB, 0, 25 * MIB, "verifying").expect("room"), 4);
+        assert_eq!(blocks_within(usize::MAX, 0, 1, "verifying").expect("room"), MOST_BLOCKS);
+        for held in [0, 10 * MIB] {
+            let refused = blocks_within(40 * MIB, held, 60 * MIB, "verifying").expect_err("too little").to_string();
+            let least = refused.split("at least ").nth(1).and_then(|rest| rest.split("MiB").next()).expect("a number");
+            let least: usize = least.parse().expect("a number");
+            let held = held / 40 * (least + 1); // the same share
+            assert!(blocks_within((least + 1) * MIB, held, 60 * MIB, "verifying").is_ok(), "{refused}");
+        }
+    }
+}
