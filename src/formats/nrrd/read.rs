@@ -7,7 +7,7 @@ use super::layout::{NAME, TYPES};
 use crate::shared::directions::Placed;
 use crate::shared::sequence::stamped_note;
 use std::path::Path;
-use wavesplat_core::base::description::{Attribute, AxisRole, Description, LPS, RAS, Values};
+use wavesplat_core::base::description::{Attribute, Description, LPS, RAS, Values};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::stored::StoredType;

@@ -162,7 +162,15 @@ impl Image {
             let attributes: Attributes = texts.map(|(name, text)| (name.into(), Attribute::Text(text))).collect();
             coordinates.insert(path.clone(), values);
             let (sample, lengths) = (Ok(StoredType::F64), vec![array.lengths[at]]);
-            made.push(Variable { path, sample, lengths, dims: vec![name], chunk: None, attributes });
+            made.push(Variable {
+                path,
+                sample,
+                lengths,
+                dims: vec![name],
+                chunk: None,
+                attributes,
+                scales: Vec::new(),
+            });
         }
         made
     }
