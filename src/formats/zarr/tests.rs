@@ -79,8 +79,12 @@ fn channels_scales_and_times_are_believed() {
     {
         let store = store(&folder, name, &attributes);
         array(&store.join("0"), &[4, 2, z, y, x], &channels(4));
-        refused(&[store.clone()], &OpenOptions::default(), "axis channel of length 2 counts neither voxels nor frames");
-        check_inputs(&[store.clone()], &named("0[1]"), TY, 4);
+        refused(
+            std::slice::from_ref(&store),
+            &OpenOptions::default(),
+            "axis channel of length 2 counts neither voxels nor frames",
+        );
+        check_inputs(std::slice::from_ref(&store), &named("0[1]"), TY, 4);
         let found = archive(&store, &named("0[1]"));
         assert_eq!((found.grid.spacing, found.grid.origin), ([0.25, 0.25, 0.5], [-4.0, 0.0, 1.0]));
         assert_eq!(found.times, [10.0, 12.0, 14.0, 16.0]);
@@ -100,8 +104,8 @@ fn channels_alone_are_no_frames_and_units_are_converted() {
     });
     let store = store(&folder, "a.zarr", &json!({ "multiscales": [image] }));
     array(&store.join("s0"), &[2, z, y, x], &channels(1));
-    refused(&[store.clone()], &OpenOptions::default(), "counts neither voxels nor frames");
-    check_inputs(&[store.clone()], &named("s0[1]"), TY, 1);
+    refused(std::slice::from_ref(&store), &OpenOptions::default(), "counts neither voxels nor frames");
+    check_inputs(std::slice::from_ref(&store), &named("s0[1]"), TY, 1);
     let found = archive(&store, &named("s0[1]"));
     assert_eq!((found.grid.spacing, found.units.space.as_deref()), ([250.0, 250.0, 2000.0], Some("nm")));
 }
@@ -118,7 +122,7 @@ fn the_finest_resolution_is_read_unless_another_is_named() {
     let store = store(&folder, "a.zarr", &json!({ "multiscales": [image] }));
     array(&store.join("0"), &[4, z, y, x], &payload(TY, 0..4, false));
     array(&store.join("1"), &[4, z, y, x], &payload(TY, 0..4, false)); // as large, but elsewhere
-    check_inputs(&[store.clone()], &OpenOptions::default(), TY, 4);
+    check_inputs(std::slice::from_ref(&store), &OpenOptions::default(), TY, 4);
     assert_eq!(archive(&store, &OpenOptions::default()).grid.spacing, [0.5, 0.5, 1.0]);
     assert_eq!(archive(&store, &named("1")).grid.spacing, [1.5, 1.5, 1.0]);
     assert_eq!(archive(&store, &named("0")).times, Vec::<f64>::new(), "no scale and no unit of time");
@@ -135,7 +139,7 @@ fn axes_are_those_of_early_versions_or_of_the_names() {
     let names = json!([{ "version": "0.3", "axes": ["t", "z", "y", "x"], "datasets": [{ "path": "0" }] }]);
     let third = store(&folder, "b.zarr", &json!({ "multiscales": names }));
     array(&third.join("0"), &[4, z, y, x], &payload(TY, 0..4, false));
-    check_inputs(&[third.clone()], &OpenOptions::default(), TY, 4);
+    check_inputs(std::slice::from_ref(&third), &OpenOptions::default(), TY, 4);
     assert!(archive(&third, &OpenOptions::default()).notes.is_empty(), "nothing is guessed");
     let wrong = store(&folder, "c.zarr", &json!({ "multiscales": [{ "axes": 7 }] }));
     refused(&[wrong], &OpenOptions::default(), "the multiscales of the group / cannot be read");
