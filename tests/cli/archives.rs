@@ -231,7 +231,7 @@ fn names_and_coordinates_of_arrays_come_back() {
         work.wavesplat("extract a.wspl -o a.nc --force").ok();
         let header = work.read("a.nc");
         move |name: &str| {
-            let mut named = (name.len() as u32).to_be_bytes().to_vec(); // its length, then its text
+            let mut named = vec![0, 0, 0, name.len() as u8]; // its length, then its text
             named.extend(name.as_bytes());
             header.windows(named.len()).filter(|bytes| *bytes == named).count()
         }
