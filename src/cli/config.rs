@@ -11,7 +11,7 @@ use std::env;
 use std::ffi::OsString;
 use std::io::Read;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::files;
@@ -29,6 +29,18 @@ pub(super) fn chosen_command<'a>(command: &'a Command, args: &[OsString]) -> &'a
 pub(super) struct Config {
     path: PathBuf,
     options: Vec<FileOption>,
+}
+
+/// The text of a file.
+fn read(path: &Path) -> Result<String> {
+    let failed = |e| Error::io(path, "reading", e);
+    let mut file = files::open_or_stream(path).map_err(|e| match e {
+        Error::Io { source, .. } => failed(source),
+        other => other,
+    })?;
+    let mut text = String::new();
+    file.read_to_string(&mut text).map_err(failed)?;
+    Ok(text)
 }
 
 /// An option of a file, as arguments.
@@ -52,9 +64,7 @@ impl Config {
         }
         match given.get_one::<PathBuf>(CONFIG).cloned().or_else(|| from_environment(program)) {
             Some(path) => {
-                let mut text = String::new();
-                let read = files::open_or_stream(&path)?.read_to_string(&mut text);
-                read.map_err(|e| Error::io(&path, "reading", e))?;
+                let text = read(&path)?;
                 let file = File { path, text: &text, program };
                 let options = file.options(command, given)?;
                 Ok(Self { path: file.path, options })
