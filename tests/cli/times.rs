@@ -121,9 +121,11 @@ fn impossible_times_are_refused() {
     work.write("a.npy", small().npy());
     work.write("few.txt", "1\n2\n");
     work.write("nan.txt", "0\n# a comment\nnan\n");
+    work.write("long.txt", "1".repeat(1 << 16));
     let fails = |options: &str, code, words: &[&str]| {
         work.wavesplat(&format!("convert a.npy -o a.wspl {options}")).fails(code, words);
     };
+    fails("--times long.txt", 3, &["long.txt", "line 1: is too long"]);
     fails("--times few.txt", 2, &["--times", "there are 2 for 40 frame(s)"]);
     fails("--times nan.txt", 3, &["nan.txt", "line 3", "\"nan\" is no finite number"]);
     fails("--times /dev/zero", 3, &["/dev/zero", "is a device, not a regular file"]);
