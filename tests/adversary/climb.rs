@@ -70,9 +70,11 @@ fn climb(target: &Target, seed: u64) -> (usize, f64) {
 }
 
 /// The share of the bound that the errors of a series use; its samples are at `places`.
-fn share(trial: &Trial, places: impl ExactSizeIterator<Item = usize>) -> f64 {
-    let (frames, delta) = (places.len() as f64, trial.file.metadata().windows[0].delta);
-    let errors = places.map(|at| (trial.source[at], (trial.found[at] - trial.source[at]).abs()));
+fn share(trial: &Trial, places: impl Iterator<Item = usize>) -> f64 {
+    let delta = trial.file.metadata().windows[0].delta;
+    let present: Vec<usize> = places.filter(|at| trial.source[*at].is_finite()).collect();
+    let frames = present.len() as f64;
+    let errors = present.into_iter().map(|at| (trial.source[at], (trial.found[at] - trial.source[at]).abs()));
     match trial.case.bound {
         Bound::Pointwise => errors.map(|(_, e)| e / delta).fold(0.0, f64::max),
         Bound::Rms | Bound::Sampled { .. } => (errors.map(|(_, e)| e * e).sum::<f64>() / frames).sqrt() / delta,
@@ -96,7 +98,11 @@ fn targets(ty: SampleType) -> Vec<Target> {
         (Basis::Haar, Bound::Sampled { samples: 9, seed: 1 }, 8, tolerances[0]),
     ];
     let target = |(basis, bound, frames, tolerance)| Target::new(ty, range, tolerance, (basis, bound), frames);
-    codings.map(target).into()
+    let mut all: Vec<Target> = codings.map(target).into();
+    let gaps = [(Basis::Haar, 2), (Basis::Multi, 3)];
+    let rms = |(basis, every)| Target { every, ..target((basis, Bound::Rms, 5, tolerances[1])) };
+    all.extend(gaps.into_iter().filter(|_| ty.is_float()).map(rms));
+    all
 }
 
 #[test]

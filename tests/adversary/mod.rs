@@ -21,6 +21,8 @@ struct Target {
     case: Case,
     lo: f64,
     hi: f64,
+    /// The series have a sample in one frame of so many; the others are missing (floats only).
+    every: usize,
 }
 
 impl Target {
@@ -33,7 +35,8 @@ impl Target {
         frames: usize,
     ) -> Self {
         let (kind, mask, window, edge, dims, seed) = (Kind::Mixed, Mask::None, 7, 16, [16, 4, 4], 0);
-        Self { case: Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed }, lo, hi }
+        let case = Case { ty, kind, mask, basis, bound, tolerance, frames, window, edge, dims, seed };
+        Self { case, lo, hi, every: 1 }
     }
 
     fn voxels(&self) -> usize {
@@ -56,9 +59,13 @@ impl Target {
     /// The samples of an archive with these series, after the two voxels that fix the range.
     fn samples(&self, series: &[Vec<f64>]) -> Vec<u8> {
         assert_eq!(series.len(), self.voxels());
-        let frame = |t: usize| [self.lo, self.hi].into_iter().chain(series.iter().map(move |s| s[t]));
+        let frame = |t: usize| [self.lo, self.hi].into_iter().chain(series.iter().map(move |s| self.present(t, s[t])));
         let all = (0..self.case.frames).flat_map(frame).map(|v| v.clamp(self.lo, self.hi));
         bytes(self.case.ty, &Vec::from_iter(all))
+    }
+
+    fn present(&self, frame: usize, value: f64) -> f64 {
+        if frame.is_multiple_of(self.every) { value } else { f64::NAN }
     }
 
     /// Like the above, with missing samples in the series.

@@ -53,6 +53,8 @@ pub(crate) enum Mask {
     Declared(f64),
     /// All frames of most voxels, and all voxels of some frames (floats only).
     Most,
+    /// All but one frame in eleven, another one in each voxel (floats only).
+    NearlyAll,
 }
 
 /// Smallest and largest sample, and the smallest step from zero.
@@ -133,6 +135,7 @@ pub(crate) fn volume(kind: Kind, ty: SampleType, mask: Mask, voxels: usize, fram
             let missing = match mask {
                 Mask::Special => random.below(12) == 0 || voxel % 9 == 4,
                 Mask::Most => voxel % 5 != 2 || t % 8 == 1,
+                Mask::NearlyAll => (t + voxel) % 11 != 0,
                 Mask::Declared(value) if random.below(7) == 0 => {
                     append(ty, value, &mut out);
                     continue;

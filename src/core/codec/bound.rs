@@ -5,7 +5,7 @@
 //! ```text
 //! pointwise    |v^ - v| <= delta = tolerance * (largest sample - least sample)                            (eq 21)
 //! relative     |v^ - v| <= tolerance * max(|v|, floor)                                                    (eq 22)
-//! rms          sqrt(mean over the frames of a window of (v^ - v)^2) <= delta                              (eq 23)
+//! rms          sqrt(mean over the present frames of a window of (v^ - v)^2) <= delta                      (eq 23)
 //! ```
 //!
 //! The weights w_i of the voxels at a pixel are positive (eq 3). So eq 21 bounds every pixel of every view, by the
@@ -17,7 +17,7 @@
 //!
 //! Under eq 22, with samples of at least the floor, the relative error of a pixel is at most the tolerance: this bounds
 //! what [Dobashi](crate::bibliography) calls E_rel (eq 10). Eq 23 bounds the mean over a window alone: one frame may be
-//! off by sqrt(T) delta. `sampled` is eq 23 with a delta from random pixels: an estimate (`convert::sampled`).
+//! off by sqrt(T) delta. Missing samples have no error and count in no mean. `sampled` is eq 23 with a delta from random pixels: an estimate (`convert::sampled`).
 //!
 //! Rounding every coefficient by at most step / 2 moves a sample by at most gain step / 2, hence
 //!
@@ -126,27 +126,27 @@ impl ErrorBound {
         }
     }
 
-    /// Whether the errors of one series are within the bound (eq 21-23). For each frame: the error, rounded up, and the
-    /// allowed error.
+    /// Whether the errors of one series are within the bound (eq 21-23). For each sample that is not missing: the error,
+    /// rounded up, and the allowed error.
     pub fn holds(&self, mut errors: impl ExactSizeIterator<Item = (f64, f64)>) -> bool {
         match self.measure() {
             Measure::Largest => errors.all(|(e, allowed)| e <= allowed),
             Measure::RootMeanSquare => {
-                let frames = errors.len() as f64;
+                let present = errors.len() as f64;
                 let add = |(sum, each): (f64, bool), (e, allowed): (f64, f64)| {
                     ((sum + (e * e).next_up()).next_up(), each && e <= allowed)
                 };
                 let (squares, each) = errors.fold((0.0, true), add);
                 // It suffices that each error is within delta. The squares alone would fail by rounding at delta itself, or
                 // underflow.
-                each || squares <= (frames * self.delta * self.delta).next_down().next_down()
+                each || squares <= (present * self.delta * self.delta).next_down().next_down()
             }
         }
     }
 
     /// The share of a series, rounded up; `errors` are as for [`Self::holds`].
     pub fn share(&self, errors: impl ExactSizeIterator<Item = (f64, f64)>) -> f64 {
-        let frames = errors.len() as f64;
+        let present = errors.len().max(1) as f64;
         let add = |(largest, squares): (f64, f64), (e, allowed)| {
             let share = share(e, allowed);
             (share.max(largest), squares + share * share)
@@ -155,7 +155,7 @@ impl ErrorBound {
         match self.measure() {
             Measure::Largest => largest,
             // The mean is at most the largest; underflow loses less than the smallest positive number.
-            Measure::RootMeanSquare => largest.min((squares / frames * UP + f64::MIN_POSITIVE).sqrt()),
+            Measure::RootMeanSquare => largest.min((squares / present * UP + f64::MIN_POSITIVE).sqrt()),
         }
     }
 
@@ -177,7 +177,7 @@ impl ErrorBound {
         }
     }
 
-    /// An upper bound of the largest share of `N` series of `frames` frames, from the sums of [`Self::add`].
+    /// An upper bound of the largest share of `N` series of `frames` frames, none of them missing, from the sums of [`Self::add`].
     pub(crate) fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
         let largest = sums.iter().copied().fold(0.0, f64::max);
         match self.bound {

@@ -87,13 +87,13 @@ impl Tally {
         let error = |t: usize| {
             let (decoded, source) = (compared.decoded[t][lane], compared.source[t][lane]);
             let rounded = sample::round_to(codec.sample, decoded);
-            let found = if index(t).is_some() { codec.error(decoded, rounded, source) } else { 0.0 };
-            (found, codec.bound.allowed(source))
+            (codec.error(decoded, rounded, source), codec.bound.allowed(source))
         };
-        let mut errors: Vec<(f64, f64)> = (0..compared.source.len()).map(error).collect(); // (error, allowed)
+        let present = (0..compared.source.len()).filter_map(|t| Some((t, index(t)?)));
+        let present: Vec<(usize, usize)> = present.collect(); // (frame, index)
+        let mut errors: Vec<(f64, f64)> = present.iter().map(|(t, _)| error(*t)).collect(); // (error, allowed)
         let holds = codec.bound.holds(errors.iter().copied());
-        for (t, (error, allowed)) in errors.iter_mut().enumerate() {
-            let Some(index) = index(t) else { continue };
+        for ((t, index), (error, allowed)) in present.into_iter().zip(&mut errors) {
             if holds || *error <= *allowed {
                 self.add(sample::round_to(codec.sample, compared.decoded[t][lane]), *error);
             } else {

@@ -128,8 +128,13 @@ impl Group {
         let errors = dispatch!(errors(&self.decoded[..], &self.source[..], &self.weight[..]));
         match measure {
             Measure::Largest => errors.largest,
-            Measure::RootMeanSquare => errors.squares.map(|sum| (sum / self.source.len() as f64).sqrt()),
+            Measure::RootMeanSquare => std::array::from_fn(|l| (errors.squares[l] / self.present(l)).sqrt()),
         }
+    }
+
+    /// How many samples of a lane are not missing; at least one.
+    fn present(&self, lane: usize) -> f64 {
+        self.weight.iter().filter(|weight| weight[lane] > 0.0).count().max(1) as f64
     }
 }
 

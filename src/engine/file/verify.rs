@@ -287,23 +287,22 @@ fn compare(
     let (mut source, mut extracted) = (Series::new(codec), Series::new(codec));
     for voxel in 0..voxels {
         let (source, extracted) = (source.load(original, voxel), extracted.load(&bytes, voxel));
-        let errors: Vec<(f64, f64)> = source
-            .iter()
-            .zip(extracted)
-            .zip((voxel..samples).step_by(voxels))
-            .map(|((source, extracted), i)| {
-                let missing = codec.is_missing(*source);
-                found.missing += u64::from(missing && same(i));
-                match missing {
-                    true if same(i) => (0.0, 0.0),
-                    true => (f64::INFINITY, 0.0),
-                    false => {
-                        range = join_ranges(range, (*extracted, *extracted));
-                        (codec.error(splatted[i], *extracted, *source), codec.bound.allowed(*source))
-                    }
-                }
-            })
-            .collect();
+        let errors = (voxel..samples).step_by(voxels).enumerate().filter_map(|(frame, i)| {
+            let missing = codec.is_missing(source[frame]);
+            if missing && same(i) {
+                found.missing += 1;
+                return None;
+            }
+            let (error, allowed) = if missing {
+                (f64::INFINITY, 0.0)
+            } else {
+                range = join_ranges(range, (extracted[frame], extracted[frame]));
+                let error = codec.error(splatted[i], extracted[frame], source[frame]);
+                (error, codec.bound.allowed(source[frame]))
+            };
+            Some(FrameError { frame, error, allowed })
+        });
+        let errors: Vec<FrameError> = errors.collect();
         add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
     }
     (found, range)
@@ -334,23 +333,31 @@ impl Series {
     }
 }
 
-/// Adds the errors of a series, each with what is allowed.
+/// The error of a sample in a frame of the window, and what is allowed.
+struct FrameError {
+    frame: usize,
+    error: f64,
+    allowed: f64,
+}
+
+/// Adds the errors of a series. Samples that are missing in both have none.
 fn add_series(
     codec: &WindowCodec,
-    errors: &[(f64, f64)],
+    errors: &[FrameError],
     place: impl Fn(usize) -> SampleLocation,
     found: &mut Comparison,
 ) {
-    let largest = errors.iter().fold(0.0, |largest, (e, _)| e.max(largest));
+    let pairs = || errors.iter().map(|e| (e.error, e.allowed));
+    let largest = pairs().fold(0.0, |largest, (e, _)| e.max(largest));
     found.largest_error = found.largest_error.max(largest);
-    found.squares += errors.iter().map(|(e, _)| e * e).sum::<f64>();
-    let holds = codec.bound.holds(errors.iter().copied());
+    found.squares += pairs().map(|(e, _)| e * e).sum::<f64>();
+    let holds = codec.bound.holds(pairs());
     found.series_outside += u64::from(!holds);
-    let share = codec.bound.share(errors.iter().copied());
+    let share = codec.bound.share(pairs());
     let share = if holds { share.min(1.0) } else { share }; // rounded up beyond what holds
     if share > found.largest_share_of_bound {
         found.largest_share_of_bound = share;
-        let shares = errors.iter().map(|(e, allowed)| bound::share(*e, *allowed)).enumerate();
+        let shares = errors.iter().map(|e| (e.frame, bound::share(e.error, e.allowed)));
         found.worst = shares.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(frame, _)| place(frame));
     }
 }
