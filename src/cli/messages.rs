@@ -114,6 +114,10 @@ pub fn advice(remedy: &Remedy) -> Cow<'static, str> {
         Remedy::AllowGaps => "--allow-gaps accepts them",
         Remedy::MaskMissing => "--missing mask keeps them as missing samples",
         Remedy::DeclareMissing(value) => return format!("if it means missing, add --missing-value {value}").into(),
+        Remedy::DeclareMissingOrError(value) => {
+            return format!("if it means missing, add --missing-value {value}; if not, allow an error by --max-error")
+                .into();
+        }
         Remedy::Try(field, value) => return format!("try --{} {value}", name(field)).into(),
         Remedy::Clip => "--clip keeps extracted samples within the extremes of the source",
         Remedy::Allow(field) => return format!("allow a larger error by --{}", name(field)).into(),

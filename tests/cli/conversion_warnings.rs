@@ -34,6 +34,25 @@ fn a_fill_value_far_beyond_the_samples_is_refused() {
 }
 
 #[test]
+fn common_fill_values_among_temperatures_are_refused_by_default() {
+    let work = Work::new();
+    let fills = [-999.0, -9999.0, 9999.0, -99.9, -999.25, 1e30, f32::MAX, -32767.0, 32767.0, 65535.0, -1.073_741_8e9];
+    for fill in fills {
+        work.write("a.npy", changed(|x, v| if x < 4 { fill } else { 280.0 + 10.0 * v }).npy());
+        let advice = ["samples are exactly", "--missing-value", "--max-error"];
+        work.wavesplat("convert a.npy -o a.wspl").fails(3, &advice);
+        work.wavesplat("convert a.npy -o a.wspl --max-error 0.1 --force").ok();
+        work.wavesplat(&format!("convert a.npy -o a.wspl --missing-value {fill} --force")).ok();
+        std::fs::remove_file(work.path("a.wspl")).unwrap();
+    }
+    let mut few = changed(|_, v| 280.0 + 10.0 * v);
+    few.values[7] = -9999.0;
+    few.values[9999] = -9999.0;
+    work.write("a.npy", few.npy());
+    work.wavesplat("convert a.npy -o a.wspl").fails(3, &["2 samples are exactly -9999"]);
+}
+
+#[test]
 fn a_fill_value_in_a_later_window_is_refused_before_that_window() {
     let work = Work::new();
     let mut archive = small();
@@ -48,7 +67,7 @@ fn a_fill_value_near_the_samples_is_warned_of_and_ordinary_extremes_are_not() {
     let work = Work::new();
     let fills = |run: &Run| warnings(run).contains("means missing");
     work.write("a.npy", changed(|x, v| if x < 4 { -999.0 } else { 20.0 * v }).npy());
-    let run = work.wavesplat("convert a.npy -o a.wspl --json").ok();
+    let run = work.wavesplat("convert a.npy -o a.wspl --tolerance 1e-3 --json").ok();
     assert!(fills(&run), "{}", run.err);
     assert_eq!(run.json()["warnings"][0]["remedy"], "if it means missing, add --missing-value -999");
     type Change = Box<dyn Fn(usize, f32) -> f32>;

@@ -41,6 +41,8 @@ pub enum Remedy {
     MaskMissing,
     /// Set `missing_value` to this: it means "missing".
     DeclareMissing(String),
+    /// Set `missing_value` to this if it means "missing"; otherwise say by `max_error` what error suits the other samples.
+    DeclareMissingOrError(String),
     /// Set this field to a value.
     Try(&'static str, String),
     /// Set `clip`, which keeps extracted samples within the extremes of the source.

@@ -101,21 +101,71 @@ impl ExtremeCounts {
     }
 }
 
+/// Whether programs write a value where they have none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Habit {
+    /// No program is known to.
+    None,
+    /// Some do, but it may also be a sample: a limit where samples saturate, or a huge number.
+    Common,
+    /// It is hardly ever a sample, far from all others.
+    Sure,
+}
+
 /// Whether programs commonly write this value where they have none: the limits of a type, nines, and huge numbers.
 /// Small integers hold counts and brightness, where a limit means saturation.
-pub fn is_customary(ty: SampleType, value: f64) -> bool {
-    match ty {
-        SampleType::U8 | SampleType::I8 => false,
-        SampleType::I16 => matches!(value, -32768.0 | -32767.0 | 32767.0) || is_nines(ty, value),
-        SampleType::U16 => value == 65535.0 || is_nines(ty, value),
-        SampleType::I32 | SampleType::U32 => value.abs() >= 2_147_483_647.0 || is_nines(ty, value),
-        SampleType::F16 => value.abs() >= 65504.0 || is_nines(ty, value),
-        SampleType::F32 | SampleType::F64 => value.abs() >= 1e15 || LIMITS.contains(&value) || is_nines(ty, value),
+pub fn habit(ty: SampleType, value: f64) -> Habit {
+    let (is_least, is_limit) = (LEAST.contains(&value), MOST.contains(&value));
+    let nines = is_nines(ty, value);
+    let (sure, common) = match ty {
+        SampleType::U8 | SampleType::I8 => (false, false),
+        SampleType::U16 => (false, is_limit || nines),
+        SampleType::U32 => (false, value >= 2_147_483_647.0 || nines),
+        SampleType::I16 | SampleType::I32 => (is_least || nines && value < 0.0, is_limit || nines),
+        SampleType::F16 => (nines, value.abs() >= 65504.0),
+        SampleType::F32 | SampleType::F64 => {
+            (is_least || nines || ODD.contains(&value) || is_known_huge(value), value.abs() >= HUGE || is_limit)
+        }
+    };
+    match (sure, common) {
+        (true, _) => Habit::Sure,
+        (false, true) => Habit::Common,
+        (false, false) => Habit::None,
     }
 }
 
-/// Limits of integers, which floats are often converted from.
-const LIMITS: [f64; 6] = [-32768.0, -32767.0, 32767.0, 65535.0, -2_147_483_648.0, 2_147_483_648.0];
+/// The least integers of 16 and 32 bits, which floats are often converted from.
+const LEAST: [f64; 3] = [-32768.0, -32767.0, -2_147_483_648.0];
+
+/// The largest integers.
+const MOST: [f64; 4] = [32767.0, 65535.0, 2_147_483_647.0, 2_147_483_648.0];
+
+/// Of well logs, of the Met Office, and of climate tables.
+const ODD: [f64; 3] = [-999.25, -1_073_741_824.0, -99.0];
+
+/// Numbers of this size are rarely samples.
+pub const HUGE: f64 = 1e15;
+
+/// Defaults of NetCDF, CMIP, Ferret, GrADS, HYCOM and Surfer, and the largest floats; of either sign.
+const KNOWN_HUGE: [f64; 12] = [
+    9.969_209_968_386_869e36,
+    1e20,
+    1e30,
+    1e34,
+    1e35,
+    1e36,
+    1e37,
+    9.999e20,
+    1.267_650_6e30,
+    1.701_41e38,
+    f32::MAX as f64,
+    f64::MAX,
+];
+
+/// Whether a value is a known one of that size, in 64 bits or rounded to 32.
+fn is_known_huge(value: f64) -> bool {
+    KNOWN_HUGE.into_iter().any(|known| value.abs() == known || value.abs() == f64::from(known as f32))
+}
 
 /// Whether the digits of a value are three nines or more, as in -9999 and 999.9.
 fn is_nines(ty: SampleType, value: f64) -> bool {
@@ -178,12 +228,19 @@ mod tests {
         for value in
             [1e20, 9.969_209_968_386_869e36, -9999.0, f64::from(-999.9_f32), 999.0, -32768.0, f64::from(f32::MAX)]
         {
-            assert!(is_customary(SampleType::F32, value), "{value}");
+            assert_eq!(habit(SampleType::F32, value), Habit::Sure, "{value}");
         }
+        for (ty, value) in [(SampleType::F32, 65535.0), (SampleType::F64, 3.2e18), (SampleType::U16, 65535.0)] {
+            assert_eq!(habit(ty, value), Habit::Common, "{value} may be a sample");
+        }
+        let f32_in_f64 = f64::from(9.969_21e36_f32);
+        assert_eq!([1e20, -999.25, f32_in_f64, -f64::MAX].map(|v| habit(SampleType::F64, v)), [Habit::Sure; 4]);
+        let short = [-32768.0, -999.0, 999.0, 32767.0, 3071.0].map(|v| habit(SampleType::I16, v));
+        assert_eq!(short, [Habit::Sure, Habit::Sure, Habit::Common, Habit::Common, Habit::None]);
         for value in [0.0, 1.0, -1.0, 255.0, 1000.0, 7800.0, 99.0, f64::from(300.15_f32), 9998.0] {
-            assert!(!is_customary(SampleType::F32, value), "{value}");
+            assert_eq!(habit(SampleType::F32, value), Habit::None, "{value}");
         }
-        assert!(!is_customary(SampleType::U8, 255.0) && is_customary(SampleType::U16, 65535.0));
+        assert_eq!(habit(SampleType::U8, 255.0), Habit::None);
         assert_eq!(written(SampleType::F32, 1e20_f32.into()), "1e20");
     }
 }

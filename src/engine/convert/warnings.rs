@@ -5,7 +5,7 @@ use super::{ConvertConfig, ConvertReport};
 use wavesplat_core::base::error::{Note, Remedy};
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::codec::bound::Bound;
-use wavesplat_core::source::extremes::{Extreme, is_customary, written};
+use wavesplat_core::source::extremes::{Extreme, HUGE, Habit, habit, written};
 use wavesplat_format::Basis;
 
 /// The reader's findings in the samples.
@@ -18,13 +18,20 @@ pub(super) struct Findings {
     pub(super) range: Option<(f64, f64)>,
 }
 
-/// An extreme dominates the range if its distance from the other samples is more than this many times their range.
+/// A value that is surely none is far if its distance from the other samples is more than this many times their range.
+const NEAR: f64 = 3.0;
+/// An extreme dominates the range beyond this distance.
 const FAR: f64 = 10.0;
-/// Beyond this distance, the error bound would exceed the range of the other samples.
+/// Beyond this distance, no sample of a usual field is.
 const FARTHEST: f64 = 1000.0;
 
 /// One sample in this many is a noticeable share.
 const MANY: u64 = 100;
+
+/// An error above this share of the range of the others is too large for them, beside a value that is surely none.
+const SMALL_SHARE: f64 = 0.05;
+/// As above, beside a value that may be a sample.
+const LARGE_SHARE: f64 = 0.1;
 
 /// The possible meaning of an extreme of the samples.
 pub(super) enum Fill {
@@ -38,20 +45,31 @@ pub(super) enum Fill {
 /// the extreme, `allowed` is the resulting error allowed to the other samples.
 pub(super) fn fill(extreme: &Extreme, samples: u64, ty: SampleType, allowed: Option<f64>) -> Option<Fill> {
     let Extreme { value, count, others: (lo, hi) } = *extreme;
-    let (far, customary) = (extreme.distance(), is_customary(ty, value));
-    let is_fill = value != 0.0 && count > 1 && far > if customary { FAR } else { FARTHEST };
-    if !is_fill || count.saturating_mul(MANY) < samples {
+    let (far, habit) = (extreme.distance(), habit(ty, value));
+    let (least, share) = limits(habit);
+    let is_many = habit == Habit::Sure || count.saturating_mul(MANY) >= samples;
+    if value == 0.0 || count < 2 || !is_many || far <= least {
         return None;
     }
+    let is_suspect = habit == Habit::Sure || habit == Habit::Common && (value.abs() < HUGE || far > FARTHEST);
     let value = written(ty, value);
     let seen = format!("{count} samples are exactly {value}, and the others are from {lo:.4e} to {hi:.4e}");
-    let remedy = Remedy::DeclareMissing(value);
-    Some(match allowed.filter(|error| customary && far > FARTHEST && *error > (hi - lo) / 10.0) {
+    Some(match allowed.filter(|error| is_suspect && *error > share * (hi - lo)) {
         Some(error) => {
-            Fill::Refuse(Note::with(format!("{seen}; an error of {error:.3e} would leave little of them"), remedy))
+            let what = format!("{seen}; an error of {error:.3e} would leave little of them");
+            Fill::Refuse(Note::with(what, Remedy::DeclareMissingOrError(value)))
         }
-        None => Fill::Warn(Note::with(seen, remedy)),
+        None => Fill::Warn(Note::with(seen, Remedy::DeclareMissing(value))),
     })
+}
+
+/// The distance beyond which a value may mean "missing", and the largest error, as shares of the range of the others.
+fn limits(habit: Habit) -> (f64, f64) {
+    match habit {
+        Habit::Sure => (NEAR, SMALL_SHARE),
+        Habit::Common => (FAR, LARGE_SHARE),
+        Habit::None => (FARTHEST, LARGE_SHARE),
+    }
 }
 
 /// All that is worth a warning.
@@ -168,15 +186,28 @@ mod tests {
 
     #[test]
     fn only_repeated_far_extremes_are_taken_for_missing() {
-        let said = |value, count, others, ty| match fill(&Extreme { value, count, others }, 100_000, ty, Some(1e9)) {
-            Some(Fill::Refuse(_)) => "refused",
-            Some(Fill::Warn(_)) => "warned",
-            None => "nothing",
+        let said_at = |tolerance: f64, value: f64, count, others: (f64, f64), ty| {
+            let allowed = tolerance * (value.max(others.1) - value.min(others.0));
+            match fill(&Extreme { value, count, others }, 100_000, ty, Some(allowed)) {
+                Some(Fill::Refuse(_)) => "refused",
+                Some(Fill::Warn(_)) => "warned",
+                None => "nothing",
+            }
         };
-        let (f32, u8) = (SampleType::F32, SampleType::U8);
+        let said = |value, count, others, ty| said_at(0.01, value, count, others, ty);
+        let (f32, u8, u16) = (SampleType::F32, SampleType::U8, SampleType::U16);
         assert_eq!(said(1e20, 30_000, (0.0, 35.0), f32), "refused");
         assert_eq!(said(-9999.0, 30_000, (0.0, 1.0), f32), "refused");
-        assert_eq!(said(-9999.0, 30_000, (0.0, 100.0), f32), "warned");
+        assert_eq!(said(-9999.0, 30_000, (0.0, 100.0), f32), "refused");
+        assert_eq!(said_at(1e-4, -9999.0, 30_000, (0.0, 100.0), f32), "warned");
+        for value in [-9999.0, -999.0, 9999.0, -999.25, 1e20, -32768.0, 32767.0, 65535.0] {
+            assert_eq!(said(value, 30_000, (250.0, 310.0), f32), "refused", "{value} among temperatures");
+        }
+        assert_eq!(said(-9999.0, 5, (250.0, 310.0), f32), "refused"); // few, and hardly samples
+        assert_eq!(said(65535.0, 5, (90.0, 400.0), u16), "nothing"); // hot pixels
+        assert_eq!(said(65535.0, 30_000, (0.0, 9000.0), u16), "nothing"); // saturated
+        assert_eq!(said(2.5e19, 30_000, (0.0, 2e18), f32), "warned"); // a dense ball
+        assert_eq!(said(3.2e19, 2, (0.0, 1e3), f32), "nothing"); // two sources
         assert_eq!(said(-9999.0, 30_000, (-9000.0, 100.0), f32), "nothing");
         assert_eq!(said(1e20, 1, (0.0, 35.0), f32), "nothing"); // a spike
         assert_eq!(said(0.0, 90_000, (300.0, 310.0), f32), "nothing"); // a background
