@@ -132,6 +132,7 @@ impl InputArgs {
             origin: self.origin.map(|o| o.0),
             times: None,
             time_unit: self.time_unit.clone(),
+            calendar: None,
             clock: None,
             allow_gaps: self.allow_gaps,
             memory,

@@ -47,11 +47,12 @@ pub use contents::plain;
 pub use npy::{ArrayHeader, array_header};
 #[doc(hidden)]
 pub use open::inputs::files;
-pub use open::{open, open_arrays, open_stream, undecided};
+pub use open::{open, open_arrays, open_named_stream, open_stream, undecided};
 pub use order::{Direction, OutputAxis, SampleOrder};
 pub use writer::SampleFormat;
 
 use format::{Format, Reader};
+use std::path::Path;
 
 /// All formats. Help and messages list their extensions in this order.
 static FORMATS: [&Format; 16] = [
@@ -84,10 +85,15 @@ pub fn extensions() -> impl Iterator<Item = &'static str> {
     inputs.flat_map(|format| format.extensions).copied()
 }
 
+/// The extension of a path, if files of frames have it. A coefficient file of such a name would mislead readers.
+pub fn extension_of_frames(path: &Path) -> Option<String> {
+    let extension = path.extension()?.to_str()?.to_lowercase();
+    extensions().any(|known| known == extension).then_some(extension)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn every_ending_is_known_once() {

@@ -87,6 +87,8 @@ pub struct OpenOptions {
     pub times: Option<GivenTimes>,
     /// The unit of times, perhaps since a date, instead of that in the files.
     pub time_unit: Option<String>,
+    /// The calendar of `times`, if it is not the usual one.
+    pub calendar: Option<String>,
     /// Units and calendar of an earlier archive. Times are converted to them where possible.
     pub clock: Option<Units>,
     /// Whether irregular numbers in the names of frame files are accepted.
@@ -113,6 +115,7 @@ impl Default for OpenOptions {
             origin: None,
             times: None,
             time_unit: None,
+            calendar: None,
             clock: None,
             allow_gaps: false,
             memory: 256 << 20,

@@ -97,7 +97,7 @@ fn clock(units: &Units) -> std::result::Result<Clock, String> {
 /// Puts the user's times in place of those of the files, and the files' onto the clock of an earlier archive.
 pub fn settle(archive: &mut Archive, options: &OpenOptions) -> Result<()> {
     if let Some(given) = &options.times {
-        (archive.units.times, archive.units.calendar) = (None, None);
+        (archive.units.times, archive.units.calendar) = (None, options.calendar.clone());
         match (given, archive.frames) {
             (GivenTimes::List(times), Some(frames)) => archive.times = listed(times, frames)?,
             (GivenTimes::List(_), None) => {

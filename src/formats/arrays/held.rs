@@ -1,6 +1,6 @@
 //! Named arrays that the caller holds or computes, such as a dataset of another program, as [`super::ArrayFile`].
 
-use super::{ArrayArchive, ArrayFile, Variable, attributes};
+use super::{ArrayArchive, ArrayFile, Attributes, Variable, attributes};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -40,6 +40,8 @@ pub struct NamedArray {
     pub chunk: Option<Vec<usize>>,
     /// Its attributes.
     pub attributes: Vec<description::Attribute>,
+    /// Whether its numbers are samples already, all of them valid: valid ranges among its attributes exclude none.
+    pub is_decoded: bool,
     /// All its values, if it is small or holds texts.
     pub values: Option<Values>,
 }
@@ -150,9 +152,19 @@ fn variable(array: &NamedArray) -> Variable {
         dims: array.dimensions.iter().map(|dimension| dimension.name.clone()).collect(),
         scales: Vec::new(),
         chunk: array.chunk.clone(),
-        attributes: attributes(&array.attributes),
+        attributes: meaning(array),
     }
 }
+
+/// The attributes that say what numbers mean.
+fn meaning(array: &NamedArray) -> Attributes {
+    let mut found = attributes(&array.attributes);
+    found.retain(|name, _| !array.is_decoded || !VALID.contains(&name.as_str()));
+    found
+}
+
+/// Attributes of the numbers that are valid.
+const VALID: [&str; 3] = ["valid_range", "valid_min", "valid_max"];
 
 fn stored_type(array: &NamedArray) -> Parsed<StoredType> {
     match array.ty {
@@ -185,7 +197,7 @@ mod tests {
         let (dimensions, values) =
             (dimensions.iter().map(dimension).collect(), values.map(|values| Values::floats(&values)));
         let ty = ArrayType::Number(if values.is_some() { NumberType::F64 } else { NumberType::F32 });
-        NamedArray { name: name.into(), ty, dimensions, chunk: None, attributes, values }
+        NamedArray { name: name.into(), ty, dimensions, chunk: None, attributes, is_decoded: false, values }
     }
 
     impl NamedArrays for Ocean {
@@ -233,6 +245,39 @@ mod tests {
             [1.0_f32, 2.0].into_iter().flat_map(|t| [0.0, 1.0].map(|x| ((t * 2.0 + 1.0) * 3.0 + 2.0) * 2.0 + x));
         assert_eq!(samples, expected.flat_map(f32::to_le_bytes).collect::<Vec<_>>());
         window.check_unchanged().expect("there is no file");
+    }
+
+    #[test]
+    fn a_valid_range_excludes_no_sample_of_decoded_arrays() {
+        struct Valid(bool, &'static str);
+        impl NamedArrays for Valid {
+            fn arrays(&self) -> Vec<NamedArray> {
+                let mut samples = array("temperature", &[0, 1, 2, 3], None, "K");
+                let value = Values::floats(if self.1 == "valid_range" { &[3.0, 5.0] } else { &[3.0] });
+                samples.attributes.push(description::Attribute { name: self.1.into(), value });
+                vec![NamedArray { is_decoded: self.0, ..samples }]
+            }
+            fn attributes(&self) -> Vec<description::Attribute> {
+                Vec::new()
+            }
+            fn read(&self, name: &str, ranges: &[Range<usize>]) -> std::result::Result<Vec<u8>, String> {
+                Ocean.read(name, ranges)
+            }
+        }
+        for (name, excluded) in [("valid_range", 9), ("valid_min", 3), ("valid_max", 8)] {
+            for is_decoded in [false, true] {
+                let arrays = Arc::new(Valid(is_decoded, name)) as Arc<dyn NamedArrays>;
+                let mut source = open_arrays("ocean", &arrays, &OpenOptions::default()).expect("an archive");
+                let archive = source.archive().clone();
+                let window = source.window(0, 1).expect("a frame");
+                let bytes =
+                    read_frames(window.as_ref(), 0..1, &archive.grid.whole(), SampleType::F32).expect("samples");
+                let missing = bytes.chunks(4).filter(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]).is_nan()).count();
+                assert_eq!(missing, if is_decoded { 0 } else { excluded }, "{name}");
+                let kept = archive.description.expect("kept").attributes;
+                assert_eq!(kept.iter().any(|attribute| attribute.name == name), is_decoded, "as samples have it");
+            }
+        }
     }
 
     #[test]

@@ -103,7 +103,19 @@ pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<Variab
 /// # Errors
 /// As [`open`]; messages call the stream `-`.
 pub fn open_stream<R: Read + Send + 'static>(reader: R, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    Ok(Box::new(stream::Stream::open(reader, options)?))
+    open_named_stream(STANDARD, reader, options)
+}
+
+/// As [`open_stream`]; `name` stands for the stream in messages.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_named_stream<R: Read + Send + 'static>(
+    name: impl AsRef<Path>,
+    reader: R,
+    options: &OpenOptions,
+) -> Result<Box<dyn FrameSource>> {
+    Ok(Box::new(stream::Stream::open(name.as_ref(), reader, options)?))
 }
 
 /// Opens named arrays that the caller holds or computes; `name` stands for them in messages. The variable is chosen, and

@@ -3,7 +3,7 @@
 use super::refuse_options;
 use crate::{npy, raw};
 use std::io::{self, Chain, Cursor, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Grid;
@@ -21,6 +21,8 @@ const CHUNK: usize = 1 << 20; // bytes asked for at a time
 
 /// Frames one after another from a reader.
 pub(crate) struct Stream<R> {
+    /// What messages call it.
+    name: PathBuf,
     archive: Archive,
     shape: Shape,
     stored: Stored, // of one frame
@@ -35,34 +37,45 @@ pub(crate) struct Stream<R> {
 
 impl<R: Read> Stream<R> {
     /// Reads the header before the first frame.
-    pub(crate) fn open(mut reader: R, options: &OpenOptions) -> Result<Self> {
+    pub(crate) fn open(name: &Path, mut reader: R, options: &OpenOptions) -> Result<Self> {
         if options.axes.is_some() {
             return Err(Error::setting("axes", "is for files: a stream has frames z y x, one after another"));
         }
         let mut head = Vec::new();
         let magic = MAGIC.len() as u64;
-        reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(STANDARD, "reading", e))?;
+        reader.by_ref().take(magic).read_to_end(&mut head).map_err(|e| Error::io(name, "reading", e))?;
         let is_npy = head == MAGIC;
         let mut reader = Cursor::new(head).chain(reader);
         let StreamHeader { shape, ty, frames, big_endian, repeated } = match (&options.dims, is_npy) {
-            (Some(_), false) => headerless(&mut reader, options)?,
-            (Some(_), true) if options.dims_are_remembered => numpy(&mut reader, &options.for_headers())?,
+            (Some(_), false) => headerless(name, &mut reader, options)?,
+            (Some(_), true) if options.dims_are_remembered => numpy(name, &mut reader, &options.for_headers())?,
             (Some(_), true) => {
                 return Err(Error::setting("dims", "the npy stream has a header; leave them out"));
             }
-            (None, true) => numpy(&mut reader, options)?,
+            (None, true) => numpy(name, &mut reader, options)?,
             (None, false) => {
-                return Err(Error::path(STANDARD, Note::with("is no npy stream", Remedy::DescribeSamples)));
+                return Err(Error::path(name, Note::with("is no npy stream", Remedy::DescribeSamples)));
             }
         };
         let mut grid = Grid::unit(shape.dims());
         override_grid(&mut grid, options);
-        check_grid(&grid, options, Path::new(STANDARD))?;
+        check_grid(&grid, options, name)?;
         let memory = options.memory;
         let mut archive = Archive { format: "stream", memory, ..Archive::new(grid, shape.sample(), frames) };
         times::settle(&mut archive, options)?;
-        let stored = Stored::plain(shape.dims(), 1, ty, big_endian).map_err(|e| Error::input(STANDARD, e))?;
-        Ok(Self { archive, shape, stored, memory, next: 0, ended: false, chunk: vec![0; CHUNK], reader, repeated })
+        let stored = Stored::plain(shape.dims(), 1, ty, big_endian).map_err(|e| Error::input(name, e))?;
+        Ok(Self {
+            name: name.into(),
+            archive,
+            shape,
+            stored,
+            memory,
+            next: 0,
+            ended: false,
+            chunk: vec![0; CHUNK],
+            reader,
+            repeated,
+        })
     }
 
     /// Reads up to `frames` frames into `held`, or skips them without a buffer. Returns the number of frames read.
@@ -88,12 +101,12 @@ impl<R: Read> Stream<R> {
         while got < bytes {
             let wanted = CHUNK.min(bytes - got);
             let n = read_some(&mut self.reader, &mut self.chunk[..wanted])
-                .map_err(|e| Error::io(STANDARD, format!("reading frame {frame}"), e))?;
+                .map_err(|e| Error::io(&self.name, format!("reading frame {frame}"), e))?;
             if n == 0 {
                 return self.end(got);
             }
             let kept = held.as_mut().map_or(Ok(()), |held| held.write_at(place + got as u64, &self.chunk[..n]));
-            kept.map_err(|e| Error::io(STANDARD, format!("holding frame {frame}"), e))?;
+            kept.map_err(|e| Error::io(&self.name, format!("holding frame {frame}"), e))?;
             got += n;
         }
         if self.archive.frames == Some(frame + 1) {
@@ -105,18 +118,18 @@ impl<R: Read> Stream<R> {
     /// Reads the header of an array after the first one; false if the stream ends before it.
     fn next_array(&mut self) -> Result<bool> {
         let mut head = [0];
-        let failed = |e| Error::io(STANDARD, "reading", e);
+        let failed = |e| Error::io(&self.name, "reading", e);
         if read_some(&mut self.reader, &mut head).map_err(failed)? == 0 {
             return Ok(false);
         }
-        let found = npy::read_header(&mut Cursor::new(head).chain(&mut self.reader), Path::new(STANDARD))?;
+        let found = npy::read_header(&mut Cursor::new(head).chain(&mut self.reader), &self.name)?;
         let alike = |array: &npy::Array| npy::Array { start: 0, ..array.clone() };
         let first = self.repeated.as_ref().map(alike);
         if first == Some(alike(&found)) {
             return Ok(true);
         }
         let what = format!("array {} is {} frame(s) of {}", self.next, found.frames, found.shape);
-        Err(Error::input(STANDARD, format!("{what}, unlike the first one, which is a frame of {}", self.shape)))
+        Err(Error::input(&self.name, format!("{what}, unlike the first one, which is a frame of {}", self.shape)))
     }
 
     /// The stream ended after `got` bytes of the next frame.
@@ -125,11 +138,11 @@ impl<R: Read> Stream<R> {
         let (frame, bytes) = (self.next, self.stored.bytes);
         if got > 0 {
             let what = format!("ends inside frame {frame}: expected {bytes} bytes, got {got}");
-            return Err(Error::input(STANDARD, Note::with(what, Remedy::Adjust(&["dims", "sample"]))));
+            return Err(Error::input(&self.name, Note::with(what, Remedy::Adjust(&["dims", "sample"]))));
         }
         match self.archive.frames {
-            Some(all) => Err(Error::input(STANDARD, format!("ends after {frame} of {all} frames"))),
-            None if frame == 0 => Err(Error::input(STANDARD, "is empty")),
+            Some(all) => Err(Error::input(&self.name, format!("ends after {frame} of {all} frames"))),
+            None if frame == 0 => Err(Error::input(&self.name, "is empty")),
             None => {
                 self.archive.frames = Some(frame);
                 Ok(false)
@@ -140,7 +153,7 @@ impl<R: Read> Stream<R> {
     fn expect_end(&mut self) -> Result<()> {
         self.ended = true;
         let mut one = [0];
-        match read_some(&mut self.reader, &mut one).map_err(|e| Error::io(STANDARD, "reading", e))? {
+        match read_some(&mut self.reader, &mut one).map_err(|e| Error::io(&self.name, "reading", e))? {
             0 => Ok(()),
             _ => {
                 let all = self.archive.frames.unwrap_or(0);
@@ -154,7 +167,9 @@ impl<R: Read> Stream<R> {
 
     fn frame(&self, index: usize, first: usize) -> Frame {
         let offset = (index * self.stored.bytes) as u64;
-        let name = format!("standard input, frame {}", first + index);
+        let name =
+            if self.name == Path::new(STANDARD) { "standard input".into() } else { self.name.display().to_string() };
+        let name = format!("{name}, frame {}", first + index);
         Frame { bytes: 0, offset, name }
     }
 }
@@ -172,7 +187,7 @@ impl<R: Read + Send> FrameSource for Stream<R> {
         self.copy(skip, None)?;
         let count = self.archive.frames.map_or(count, |all| count.min(all - self.next));
         let bytes = count.saturating_mul(self.stored.bytes);
-        let mut data = SpillBuffer::new(bytes, self.memory, Path::new(STANDARD))?;
+        let mut data = SpillBuffer::new(bytes, self.memory, &self.name)?;
         let held = self.copy(count, Some(&mut data))?;
         let frames = (0..held).map(|i| self.frame(i, first)).collect();
         let bytes = vec![(Bytes::SpillBuffer { data: Arc::new(data), file: None }, self.stored.clone())];
@@ -189,10 +204,10 @@ struct StreamHeader {
     repeated: Option<npy::Array>,
 }
 
-fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHeader> {
+fn headerless(name: &Path, reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHeader> {
     let (shape, frames) = raw::shape(options)?;
     let skipped = io::copy(&mut reader.take(options.offset), &mut io::sink());
-    match skipped.map_err(|e| Error::io(STANDARD, "reading", e))? {
+    match skipped.map_err(|e| Error::io(name, "reading", e))? {
         n if n == options.offset => {
             let frames = frames.filter(|_| !options.dims_are_remembered);
             Ok(StreamHeader {
@@ -203,13 +218,13 @@ fn headerless(reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHea
                 repeated: None,
             })
         }
-        n => Err(Error::input(STANDARD, format!("ends after {n} bytes, inside the offset of {}", options.offset))),
+        n => Err(Error::input(name, format!("ends after {n} bytes, inside the offset of {}", options.offset))),
     }
 }
 
-fn numpy(reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHeader> {
-    refuse_options(Path::new(STANDARD), &npy::FORMAT, options)?;
-    let array = npy::read_header(reader, Path::new(STANDARD))?;
+fn numpy(name: &Path, reader: &mut impl Read, options: &OpenOptions) -> Result<StreamHeader> {
+    refuse_options(name, &npy::FORMAT, options)?;
+    let array = npy::read_header(reader, name)?;
     let npy::Array { shape, ty, frames, big_endian, axes, .. } = array;
     let repeated = (axes == 3).then_some(array); // others like it may follow
     let frames = repeated.is_none().then_some(frames);
