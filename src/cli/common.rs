@@ -8,9 +8,10 @@ use clap::Args;
 use serde::Serialize;
 use std::fmt::Arguments;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::progress::Progress;
+use wavesplat_formats::extension_of_frames;
 use wavesplat_jobs::picture::Reporter;
 use wavesplat_jobs::report::report_text;
 
@@ -114,6 +115,13 @@ impl Reporter for CommonArgs {
     fn progress(&self, stage: &'static str, unit: &'static str) -> Box<dyn Progress + '_> {
         Box::new(Self::progress(self, stage, unit))
     }
+}
+
+/// An error if a coefficient file would have the extension of a format of frames, which would mislead its readers.
+pub(crate) fn coefficient_name(output: &Path) -> Result<()> {
+    let Some(extension) = extension_of_frames(output) else { return Ok(()) };
+    let what = format!("a coefficient file is named .wspl, not .{extension}; wavesplat extract writes other formats");
+    Err(Error::usage(format!("{}: {what}", output.display())))
 }
 
 /// Parses a number of threads.

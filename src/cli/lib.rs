@@ -26,6 +26,7 @@ mod values;
 pub mod view;
 
 pub use common::CommonArgs;
+use common::coefficient_name;
 pub use generate::{GenerateArgs, Generated, command};
 pub use input::{InputArgs, SelectArgs, narrow, remembered};
 pub use messages::{advice, error_text, note_text};

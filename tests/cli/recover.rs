@@ -126,3 +126,15 @@ fn unrecoverable_files_are_reported() {
     work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace the input"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "newer.wspl", "start.wspl", "text.wspl"]);
 }
+
+/// As `convert` refuses it: readers would take the file for what its name says.
+#[test]
+fn an_output_named_like_another_format_is_refused_by_every_command_that_writes_coefficients() {
+    let (work, _) = work();
+    for name in ["b.nc", "b.NPY", "b.zarr", "b.nrrd"] {
+        for command in ["convert a.npy", "convert a.wspl", "recover a.wspl", "merge a.wspl"] {
+            work.wavesplat(&format!("{command} -o {name}")).fails(2, &["named .wspl", name]);
+        }
+    }
+    assert_eq!(work.names(), ["a.npy", "a.wspl"]);
+}

@@ -1,6 +1,6 @@
 //! `wavesplat merge`
 
-use crate::{CommonArgs, spare_inputs};
+use crate::{CommonArgs, coefficient_name, spare_inputs};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
@@ -45,6 +45,7 @@ pub(crate) struct MergeArgs {
 pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     args.common.start()?;
     spare_inputs(&args.shards, &args.output)?;
+    coefficient_name(&args.output)?;
     let shards = Shards::open(&args.shards, args.skip_damaged, &args.common.progress("open", "shards"))?;
     let if_unfinished = IfUnfinished::from_flags(args.force, args.resume);
     let progress = args.common.progress("merge", "windows");

@@ -1,6 +1,6 @@
 //! `wavesplat recover`
 
-use crate::{CommonArgs, print, spare_inputs};
+use crate::{CommonArgs, coefficient_name, print, spare_inputs};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
@@ -41,6 +41,7 @@ pub(crate) fn run(args: &RecoverArgs) -> Result<()> {
     args.common.start()?;
     let damaged = FileBytes::open(&args.file, Access::unless(args.no_mmap))?;
     spare_inputs(std::slice::from_ref(&args.file), &args.output)?;
+    coefficient_name(&args.output)?;
     let mut out = Output::create(&args.output, args.force)?;
     let report = recover(
         &damaged,

@@ -3,7 +3,7 @@
 mod given;
 mod options;
 
-use crate::{CommonArgs, InputArgs, RemoteArgs, advice, note_text, spare_inputs};
+use crate::{CommonArgs, InputArgs, RemoteArgs, advice, coefficient_name, note_text, spare_inputs};
 use clap::{Arg, Args, Command};
 pub(crate) use options::ConvertArgs;
 use serde::Serialize;
@@ -16,7 +16,6 @@ use wavesplat_engine::convert::{Bound, ConvertReport, Failure, run as convert};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::repack::{RepackReport, repack};
 use wavesplat_engine::file::resume::{self, IfUnfinished};
-use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::colours_of_source;
 
 /// Converts one variable.
@@ -91,13 +90,7 @@ impl ConvertArgs {
     /// readers of the file.
     fn check_output(&self) -> Result<()> {
         spare_inputs(&self.inputs, &self.output)?;
-        let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
-        if !extensions().any(|known| known == extension) {
-            return Ok(());
-        }
-        let what =
-            format!("a coefficient file is named .wspl, not .{extension}; wavesplat extract writes other formats");
-        Err(Error::usage(format!("{}: {what}", self.output.display())))
+        coefficient_name(&self.output)
     }
 
     /// The colours for samples, if samples are turned into colours.
