@@ -175,7 +175,7 @@ pub use wavesplat_jobs::{extract, picture};
 pub mod base {
     #[doc(inline)]
     pub use wavesplat_core::base::{
-        address, cancel, choice, description, error, grid, inputs, mapped, progress, sample, values,
+        address, cancel, choice, description, error, grid, inputs, mapped, progress, sample, values, workers,
     };
 }
 

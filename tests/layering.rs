@@ -43,6 +43,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
     (
         "rayon::",
         &[
+            "core/base/workers.rs",
             "core/source/scan.rs",
             "engine/file/fetch.rs",
             "engine/file/check.rs",

@@ -8,6 +8,7 @@ pub mod progress;
 pub mod cancel;
 pub mod choice;
 pub mod memory;
+pub mod workers;
 pub mod vectors;
 pub mod zeroed;
 #[doc(hidden)]

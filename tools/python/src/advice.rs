@@ -5,7 +5,8 @@ use wavesplat::base::error::{Error, Note, Remedy};
 /// The words of an error, with advice if there is some.
 pub(crate) fn of_error(error: &Error) -> String {
     let words = match error {
-        Error::Setting { .. } => error.to_string().replace('`', ""), // around names of arguments
+        Error::Setting { setting: "request", problem, .. } => problem.replace('`', ""), // of one of its fields
+        Error::Setting { .. } => error.to_string().replace('`', ""),                    // around names of arguments
         other => other.to_string(),
     };
     advised(words, error.remedy().as_ref())
@@ -33,6 +34,9 @@ fn advice(remedy: &Remedy) -> Option<String> {
         }
         Remedy::MaskMissing => "missing='mask' keeps them as missing samples".into(),
         Remedy::DeclareMissing(value) => format!("if it means missing, give missing={value}"),
+        Remedy::DeclareMissingOrError(value) => {
+            format!("if it means missing, give missing={value}; if not, allow an error by max_error=...")
+        }
         Remedy::Try(field, value) => format!("try {field}={value}"),
         Remedy::Clip => "clip=True keeps decoded samples within the extremes of the source".into(),
         Remedy::Allow(field) => format!("allow a larger error by {field}"),

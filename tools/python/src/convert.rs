@@ -3,6 +3,7 @@
 
 use crate::advice;
 use crate::described::{GivenValues, given_attributes};
+use crate::fork;
 use crate::frames::FrameReader;
 use crate::job::{self, Caller};
 use crate::named::{GivenArray, PythonArrays};
@@ -15,7 +16,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{ConvertRequest, run};
 use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::IfUnfinished;
-use wavesplat::formats::{self, NamedArrays};
+use wavesplat::formats::{self, NamedArrays, extension_of_frames};
 use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
 
 /// The request for a conversion, and its output.
@@ -45,6 +46,8 @@ impl Conversion {
         open: impl FnOnce(Caller) -> Result<Box<dyn FrameSource>> + Send,
         report: Option<&Py<PyAny>>,
     ) -> PyResult<Converted> {
+        coefficient_name(&self.path)?;
+        fork::refuse()?;
         let if_unfinished = IfUnfinished::from_flags(self.overwrite, self.resume);
         job::run(py, report, |progress, caller| {
             let source = open(caller)?;
@@ -57,6 +60,13 @@ impl Conversion {
     }
 }
 
+/// An error if a coefficient file would have the extension of another format.
+fn coefficient_name(path: &Path) -> PyResult<()> {
+    let Some(extension) = extension_of_frames(path) else { return Ok(()) };
+    let what = format!("a coefficient file is named .wspl, not .{extension}; wavesplat extract writes other formats");
+    Err(PyValueError::new_err(format!("{}: {what}", path.display())))
+}
+
 /// The report of a conversion as JSON, `None` if the file was complete already; and notes.
 type Converted = (Option<String>, Vec<String>);
 
@@ -66,11 +76,14 @@ type Converted = (Option<String>, Vec<String>);
 pub(crate) struct Layout {
     /// Voxels along x, y and z; then frames, if their number is known.
     dims: Vec<usize>,
+    /// What messages call the frames.
+    name: String,
     sample: String,
     spacing: Option<[f64; 3]>,
     origin: Option<[f64; 3]>,
     times: Option<Vec<f64>>,
     time_unit: Option<String>,
+    calendar: Option<String>,
 }
 
 /// Converts frames that an iterator gives as bytes, x fastest.
@@ -83,13 +96,14 @@ pub(crate) fn convert_frames(
     conversion: Conversion,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
-    let Layout { dims, sample, spacing, origin, times, time_unit } = layout;
+    let Layout { dims, name, sample, spacing, origin, times, time_unit, calendar } = layout;
     let sample = SampleType::ALL.into_iter().find(|ty| ty.name() == sample);
     let times = times.map(|times| GivenTimes::List(times.into()));
     let request = conversion.request()?;
     let (dims, memory) = (Some(dims), request.memory / SHARE);
-    let options = OpenOptions { dims, sample, spacing, origin, times, time_unit, memory, ..OpenOptions::default() };
-    let open = |caller| formats::open_stream(FrameReader::new(iterator, caller), &options);
+    let placed = OpenOptions { dims, sample, spacing, origin, ..OpenOptions::default() };
+    let options = OpenOptions { times, time_unit, calendar, memory, ..placed };
+    let open = |caller| formats::open_named_stream(name, FrameReader::new(iterator, caller), &options);
     conversion.run(py, &request, open, report.as_ref())
 }
 
@@ -138,6 +152,7 @@ pub(crate) fn merge(
     overwrite: bool,
     report_to: Option<Py<PyAny>>,
 ) -> PyResult<String> {
+    coefficient_name(&path)?;
     job::run(py, report_to.as_ref(), |progress, _| {
         let shards = Shards::open(&shards, false, progress)?;
         let if_unfinished = IfUnfinished::from_flags(overwrite, resume);

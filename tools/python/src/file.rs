@@ -3,7 +3,7 @@
 
 use crate::errors::raised;
 use crate::look::{Viewer, bytes, render_from};
-use crate::{described, job};
+use crate::{described, fork, job};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -55,7 +55,7 @@ impl File {
             let session = Session::from_file(whole.clone(), inputs, 0);
             Ok(Self { file: whole.with_detail(lod)?, session })
         };
-        py.detach(open).map_err(raised)
+        fork::call(py, open)
     }
 
     /// Makes the pictures of a request, given as JSON. `memory` is a size such as 512MiB.
@@ -216,7 +216,7 @@ impl File {
             room.map(|room| room.copy_from_slice(samples)).ok_or(wavesplat::Error::setting("out", "is too small"))
         };
         match is_short {
-            true => py.detach(|| extract_to(&self.file, &config, &mut write, &Silent)).map_err(raised)?,
+            true => fork::call(py, || extract_to(&self.file, &config, &mut write, &Silent))?,
             false => job::run(py, None, |progress, _| extract_to(&self.file, &config, &mut write, progress))?,
         };
         Ok(())

@@ -1,6 +1,7 @@
 //! Long work beside Python: it reports progress, and Ctrl-C ends it.
 
 use crate::errors::raised;
+use crate::fork::{self, Running};
 use pyo3::prelude::*;
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -57,12 +58,13 @@ pub(crate) fn run<T: Send>(
     report: Option<&Py<PyAny>>,
     work: impl FnOnce(&dyn Progress, Caller) -> wavesplat::Result<T> + Send,
 ) -> PyResult<T> {
+    let _running = Running::begin()?;
     let (job, (calls, called)) = (CancelToken::default(), channel());
     let caller = Caller { calls, raised: Arc::default() };
     let raised_by_calls = caller.raised.clone();
     let (done, raising) = py.detach(|| {
         thread::scope(|scope| {
-            let worker = scope.spawn(|| work(&job, caller)); // when it ends, nobody can call
+            let worker = scope.spawn(|| fork::answer(|| work(&job, caller))); // when it ends, nobody can call
             let raising = serve(&called, &job, report);
             drop(called);
             (worker.join().unwrap_or_else(|panic| resume_unwind(panic)), raising)

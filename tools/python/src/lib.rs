@@ -8,6 +8,7 @@ mod convert;
 mod described;
 mod errors;
 mod file;
+mod fork;
 mod frames;
 mod job;
 mod look;
@@ -23,6 +24,8 @@ mod _wavesplat {
     use super::errors::{BoundMissedError, ChangedError, DamagedError, InputError, UnsupportedError, WavesplatError};
     #[pymodule_export]
     use super::file::File;
+    #[pymodule_export]
+    use super::fork::after_fork;
     #[pymodule_export]
     use super::look::{Viewer, render};
 

@@ -2,11 +2,12 @@
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
 use crate::errors::raised;
+use crate::fork::Running;
 use crate::job;
 use pyo3::prelude::*;
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use wavesplat::Error;
 use wavesplat::picture::{self, Caller, Inputs, PictureRequest, Session, ViewerSession};
 use wavesplat_cli::Size;
@@ -44,10 +45,16 @@ pub(crate) fn bytes(memory: &str) -> wavesplat::Result<usize> {
     memory.parse().map(|size: Size| size.0).map_err(|what| Error::setting("memory", what))
 }
 
+/// A server that answers.
+struct Server {
+    serving: Serving,
+    running: Running,
+}
+
 /// A viewer that answers the browser until it is closed.
 #[pyclass(frozen, module = "wavesplat._wavesplat")]
 pub(crate) struct Viewer {
-    serving: Mutex<Option<Serving>>,
+    server: Mutex<Option<Server>>,
     #[pyo3(get)]
     address: String,
 }
@@ -56,10 +63,11 @@ impl Viewer {
     pub(crate) fn new(py: Python<'_>, session: Session, request: &str, port: u16) -> PyResult<Self> {
         let request = PictureRequest::from_json(request).map_err(raised)?;
         let session = ViewerSession::new(&session, request, Vec::new());
+        let running = Running::begin()?;
         let localhost = IpAddr::V4(Ipv4Addr::LOCALHOST);
         let viewer = py.detach(|| view::Viewer::new(session, localhost, port, None)).map_err(raised)?;
         let address = viewer.address.clone();
-        Ok(Self { serving: Mutex::new(Some(viewer.serve_aside())), address })
+        Ok(Self { server: Mutex::new(Some(Server { serving: viewer.serve_aside(), running })), address })
     }
 }
 
@@ -70,7 +78,25 @@ impl Viewer {
     }
 
     fn close(&self, py: Python<'_>) {
-        let serving = self.serving.lock().unwrap_or_else(PoisonError::into_inner).take();
-        py.detach(|| drop(serving));
+        py.detach(|| self.end());
+    }
+}
+
+impl Viewer {
+    /// Ends the server in the process that has it. In another one, it is left alone: its thread cannot be joined.
+    fn end(&self) {
+        let Some(Server { serving, running }) = self.server.try_lock().ok().and_then(|mut server| server.take()) else {
+            return;
+        };
+        match running.is_here() {
+            true => drop(serving),
+            false => std::mem::forget(serving),
+        }
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        self.end();
     }
 }

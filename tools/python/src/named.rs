@@ -21,6 +21,7 @@ pub(crate) struct GivenArray<'py> {
     chunk: Option<Vec<usize>>,
     attributes: Vec<(String, GivenValues<'py>)>,
     values: Option<GivenValues<'py>>,
+    is_decoded: bool,
 }
 
 impl GivenArray<'_> {
@@ -42,6 +43,7 @@ impl GivenArray<'_> {
             dimensions: self.dimensions.iter().map(dimension).collect(),
             chunk: self.chunk.clone(),
             attributes: given_attributes(&self.attributes)?,
+            is_decoded: self.is_decoded,
             values,
         })
     }

@@ -138,3 +138,45 @@ def test_an_array_by_numpys_protocol(file, decoded):
     assert np.asarray(file, dtype="f8").dtype == np.float64
     with pytest.raises(ValueError, match="decoded"):
         file.__array__(copy=False)
+
+
+def test_closing(path, decoded):
+    with wavesplat.open(path) as file:
+        np.testing.assert_array_equal(file[3], decoded[3])
+        assert not file.closed
+    assert file.closed
+    assert "closed" in repr(file)
+    file.close()
+    for use in (lambda: file[3], lambda: file.render(size=(8, 8)), lambda: file.times, lambda: pickle.dumps(file)):
+        with pytest.raises(ValueError, match="run.wspl: is closed"):
+            use()
+
+
+def test_addresses_of_files(path, decoded, tmp_path):
+    spaced = tmp_path / "a b#1?.wspl"
+    shutil.copy(path, spaced)
+    quoted = str(spaced).replace(" ", "%20").replace("#", "%23").replace("?", "%3F")
+    for address in (f"file://{path}", f"file://localhost{path}", f"FILE://{path}", f"file://{quoted}"):
+        np.testing.assert_array_equal(wavesplat.open(address)[1], decoded[1])
+    with pytest.raises(ValueError, match="another machine, elsewhere"):
+        wavesplat.open(f"file://elsewhere{path}")
+    with pytest.raises(FileNotFoundError):
+        wavesplat.open("file:///none/none.wspl")
+    wavesplat.convert(decoded, f"file://{tmp_path}/c.wspl")
+    assert (tmp_path / "c.wspl").exists()
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda file: wavesplat.open(7), "str, bytes or os.PathLike"),
+        (lambda file: wavesplat.open(file.path, lod="1"), "lod: takes a whole number, not '1'"),
+        (lambda file: file.read(memory="1GiB"), "memory: takes a whole number"),
+        (lambda file: file.read(channel=0.5), "channel: takes a whole number"),
+        (lambda file: file.read(out=[0.0]), "out: takes an array of numpy, not list"),
+        (lambda file: wavesplat.merge(file.path, "a.wspl"), "shards: takes a list of files"),
+    ],
+)
+def test_wrong_types_say_what_is_wanted(file, call, words):
+    with pytest.raises(TypeError, match=words):
+        call(file)

@@ -1,6 +1,8 @@
 """Datasets go into files and come back, lazily and with all that they say."""
 
+import io
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -193,3 +195,94 @@ def test_only_coefficient_files_are_guessed(tmp_path):
     (tmp_path / "text.wspl").write_text("nothing")
     with pytest.raises(wavesplat.DamagedError, match="text.wspl"):
         xr.open_dataset(tmp_path / "text.wspl")
+
+
+@pytest.mark.parametrize(
+    "attrs",
+    [
+        {"valid_range": np.array([-1, 1], "f4")},
+        {"valid_min": np.float32(0)},
+        {"valid_max": np.float32(0.5), "valid_min": np.float32(-0.5)},
+    ],
+)
+def test_valid_ranges_of_decoded_datasets_exclude_no_samples(tmp_path, attrs):
+    ds = ocean()
+    ds.thetao.attrs.update(attrs)
+    ds.to_wavesplat(tmp_path / "a.wspl", tolerance=0)
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    xr.testing.assert_equal(back.thetao, ds.thetao)
+    np.testing.assert_equal(dict(back.thetao.attrs), dict(ds.thetao.attrs))
+
+
+def packed(tmp_path):
+    """A dataset of int16 with a valid range of stored numbers, as another program wrote it."""
+    ds = ocean()
+    ds.thetao.attrs["valid_range"] = np.array([-100, 100], "i2")
+    ds.thetao.encoding = {"dtype": "i2", "scale_factor": 0.01, "add_offset": 280.0, "_FillValue": np.int16(-32768)}
+    ds["thetao"] = (ds.thetao + 280.0).assign_attrs(ds.thetao.attrs)
+    ds.thetao.encoding = {"dtype": "i2", "scale_factor": 0.01, "add_offset": 280.0, "_FillValue": np.int16(-32768)}
+    ds.to_netcdf(tmp_path / "packed.nc")
+    return tmp_path / "packed.nc"
+
+
+def test_valid_ranges_of_packed_datasets_count_stored_numbers(tmp_path):
+    source = packed(tmp_path)
+    decoded = xr.open_dataset(source)
+    decoded.to_wavesplat(tmp_path / "decoded.wspl", tolerance=0)
+    back = xr.open_dataset(tmp_path / "decoded.wspl").thetao
+    xr.testing.assert_equal(back, decoded.thetao)
+    assert "valid_range" not in back.attrs
+    xr.open_dataset(source, mask_and_scale=False).to_wavesplat(tmp_path / "raw.wspl", tolerance=0)
+    run("convert", source, "-o", tmp_path / "program.wspl", "--tolerance", "0", "-q")
+    raw, program = (xr.open_dataset(tmp_path / f"{name}.wspl").thetao for name in ("raw", "program"))
+    xr.testing.assert_identical(raw, program)
+    assert raw.isnull().sum() > decoded.thetao.isnull().sum()
+
+
+def test_booleans_and_wide_integers(tmp_path):
+    samples = smooth((6, 5, 7, 8))
+    dims = ("time", "z", "y", "x")
+    ds = xr.Dataset({"ice": (dims, samples > 0), "count": (dims, (1000 * samples).astype("i8"))})
+    ds.to_wavesplat(tmp_path / "%n.wspl", tolerance=0)
+    for name in ("ice", "count"):
+        back = xr.open_dataset(tmp_path / f"{name}.wspl")[name]
+        np.testing.assert_array_equal(back, ds[name])
+    assert xr.open_dataset(tmp_path / "ice.wspl").ice.dtype == bool
+
+
+def test_names_that_files_cannot_have(tmp_path):
+    samples = smooth((6, 5, 7, 8))
+    with pytest.raises(ValueError, match="'speed/10m' has a slash"):
+        xr.DataArray(samples, dims=list("tzyx"), name="speed/10m").to_wavesplat(tmp_path / "a.wspl")
+    with pytest.raises(ValueError, match="'level/m' has a slash"):
+        xr.DataArray(samples, dims=["t", "level/m", "y", "x"], name="speed").to_wavesplat(tmp_path / "a.wspl")
+    with pytest.raises(ValueError, match="names are texts, not 7"):
+        xr.Dataset({7: (tuple("tzyx"), samples)}).to_wavesplat(tmp_path / "a.wspl")
+    xr.DataArray(samples, dims=list("tzyx"), name=7).to_wavesplat(tmp_path / "a.wspl")
+    assert list(xr.open_dataset(tmp_path / "a.wspl")) == ["7"]
+    dates = xr.Dataset({"when": (tuple("tzyx"), samples.astype("i8").astype("M8[ns]"))})
+    with pytest.raises(ValueError, match="'when' has values of type datetime64.*no samples"):
+        dates.to_wavesplat(tmp_path / "b.wspl", variable="when")
+
+
+def test_ways_to_open(tmp_path):
+    ds = ocean()
+    ds.to_wavesplat(tmp_path / "a.wspl", tolerance=0)
+    path = tmp_path / "a.wspl"
+    with open(path, "rb") as opened:
+        xr.testing.assert_equal(xr.open_dataset(opened, engine="wavesplat").thetao, ds.thetao)
+    xr.testing.assert_equal(xr.open_dataset(f"file://{path}", engine="wavesplat").thetao, ds.thetao)
+    with pytest.raises(TypeError, match="takes a path or an address"):
+        xr.open_dataset(io.BytesIO(path.read_bytes()), engine="wavesplat")
+    xr.testing.assert_equal(xr.open_dataset(path, concat_characters=False).thetao, ds.thetao)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # newer versions prefer decode_times
+        assert xr.open_dataset(path, use_cftime=True).time.dtype == object
+
+
+def test_trees_have_one_node(tmp_path):
+    pytest.importorskip("xarray", minversion="2024.10")
+    ds = ocean()
+    ds.to_wavesplat(tmp_path / "a.wspl", tolerance=0)
+    tree = xr.open_datatree(tmp_path / "a.wspl")
+    xr.testing.assert_equal(tree.to_dataset().thetao, ds.thetao)

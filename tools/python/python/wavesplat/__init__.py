@@ -10,6 +10,7 @@ With xarray, ``xr.open_dataset("run.wspl")`` opens a file lazily, and ``ds.to_wa
 ``import wavesplat.xarray``.
 """
 
+import os as _os
 import sys as _sys
 
 from ._convert import convert, merge
@@ -24,6 +25,9 @@ from ._wavesplat import (
     WavesplatError,
     __version__,
 )
+from ._wavesplat import after_fork as _after_fork
+
+_os.register_at_fork(after_in_child=_after_fork)  # threads do not follow a fork
 
 if "xarray" in _sys.modules:  # its users expect Dataset.to_wavesplat; others do not wait for its import
     from . import xarray as _xarray  # noqa: F401

@@ -7,26 +7,19 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain
-from operator import methodcaller
 from os import PathLike
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _wavesplat
+from ._arguments import located, number, pair, text, three, whole
 from ._file import MEMORY
+from ._frames import Frames
 from ._progress import Progress, reporting
-
-SAMPLES = {"u1": "u8", "i1": "i8", "u2": "u16", "i2": "i16", "u4": "u32", "i4": "i32"} | {
-    "f2": "f16",
-    "f4": "f32",
-    "f8": "f64",
-}
-"""The library's names of types of samples."""
+from ._times import Times
 
 
 def convert(
@@ -62,9 +55,9 @@ def convert(
     leaves the finished windows in ``path`` + ".part"; ``resume=True`` continues there.
 
     Args:
-        source: An array of shape (time, z, y, x) or (time, y, x): numpy's, Dask's, Zarr's or another that can be sliced;
-            an iterable of frames (z, y, x) or (y, x); or a DataArray or Dataset of xarray, of which coordinates, attributes
-            and times are kept.
+        source: An array of shape (time, z, y, x) or (time, y, x): numpy's, Dask's, Zarr's, netCDF4's or another that can be
+            sliced; an iterable of frames (z, y, x) or (y, x); or a DataArray or Dataset of xarray, of which coordinates,
+            attributes and times are kept. Integers of 64 bits must fit into 32, and booleans become 0 and 1.
         path: The ``.wspl`` file to write. For a Dataset with several variables, "%n" in it stands for the name of each.
         tolerance: The error allowed for each sample, as a share of the range of values; 0 keeps every bit. 0.01 by default.
             A dict gives one for each variable.
@@ -74,12 +67,13 @@ def convert(
         floor: For "relative": smaller samples may have the error of a sample of this size.
         range: The range of values that ``tolerance`` refers to; by default that of the frames so far.
         missing: "mask" keeps NaN and infinities as they are, "error" refuses them, and a number means "missing" as well. By
-            default they are kept if the source says that some may be missing, and refused otherwise.
+            default they are kept if the source says that some may be missing, and refused otherwise. Masked samples become
+            NaN by "mask", or that number.
         clip: Whether decoded samples are kept within the extremes of the source.
         variable: Which variable of a Dataset; all that have three axes by default.
         axes: What each axis of a Dataset's variable counts, slowest first, in letters of "tzyx" ("c" for another); by
             default that follows from names, attributes and order.
-        times: The time of each frame, for arrays: ascending numbers, or numpy's datetimes.
+        times: The time of each frame, for arrays: ascending numbers, dates or lengths of time, of numpy, cftime or Python.
         time_unit: The unit of ``times``, perhaps since a date: "hours since 2000-01-01".
         spacing: The distance of voxels along x, y and z, for arrays.
         origin: The place of the first voxel along x, y and z, for arrays.
@@ -104,16 +98,17 @@ def convert(
     """
     request: dict[str, Any] = {
         "bound": _bound(bound, floor),
-        "range": None if range is None else [_finite("range", end) for end in (range[0], range[1])],
+        "range": None if range is None else [_finite("range", end) for end in pair("range", "(LO, HI)", range)],
         **_missing(missing),
-        "clip": clip,
-        "window": window,
-        "chain": chain,
-        "block": block,
-        "level": level,
-        "memory": memory,
+        "clip": bool(clip),
+        "window": whole("window", window),
+        "chain": whole("chain", chain),
+        "block": None if block is None else whole("block", block),
+        "level": whole("level", level),
+        "memory": whole("memory", memory),
     }
-    given = Conversion(request, os.fspath(path), resume, overwrite, Allowed(tolerance, max_error))
+    variable, axes = text("variable", variable), text("axes", axes)
+    given = Conversion(request, located(path), bool(resume), bool(overwrite), Allowed(tolerance, max_error))
     if _is_of_xarray(source):
         from ._dataset import convert_dataset
 
@@ -124,15 +119,17 @@ def convert(
         return convert_dataset(source, given, variable=variable, axes=axes, progress=progress)
     if variable is not None or axes is not None or shard is not None:
         raise ValueError("variable, axes and shard are for a Dataset: an array is (time, z, y, x)")
-    times, time_unit = _numbers(times, time_unit)
-    frames = Frames.of(source, memory)
+    when = Times.of(times, text("time_unit", time_unit))
+    frames = Frames.of(source, memory, missing)
     layout = {
         "dims": frames.dims,
+        "name": frames.name,
         "sample": frames.sample,
-        "spacing": spacing,
-        "origin": origin,
-        "times": times,
-        "time_unit": time_unit,
+        "spacing": three("spacing", spacing),
+        "origin": three("origin", origin),
+        "times": when.numbers,
+        "time_unit": when.unit,
+        "calendar": when.calendar,
     }
     conversion = given.of_variable(None)
     with reporting(progress, "convert") as report:
@@ -165,8 +162,10 @@ def merge(
 
     """
     with reporting(progress, "merge") as report:
-        names = [os.fspath(shard) for shard in shards]
-        found: dict[str, Any] = json.loads(_wavesplat.merge(names, os.fspath(path), resume, overwrite, report))
+        if isinstance(shards, (str, bytes, PathLike)):
+            raise TypeError("shards: takes a list of files, not one")
+        names = [located(shard) for shard in shards]
+        found: dict[str, Any] = json.loads(_wavesplat.merge(names, located(path), resume, overwrite, report))
     return found
 
 
@@ -203,20 +202,18 @@ class Conversion:
     def of_variable(self, variable: str | None) -> dict[str, Any]:
         """The conversion of a variable, as the native half takes it."""
         request = self.request | self.allowed.of_variable(variable)
-        words = json.dumps(request, default=methodcaller("item"))  # of numbers that are numpy's
-        return {"request": words, "path": self.path, "resume": self.resume, "overwrite": self.overwrite}
+        return {"request": json.dumps(request), "path": self.path, "resume": self.resume, "overwrite": self.overwrite}
 
 
-def _number(number: Any) -> float | str:
+def _number(value: float) -> float | str:
     """A number for JSON, which has no NaN."""
-    number = float(number)
-    return number if math.isfinite(number) else repr(number)
+    return value if math.isfinite(value) else repr(value)
 
 
-def _finite(name: str, number: Any) -> float:
-    if not math.isfinite(number):
+def _finite(name: str, value: Any) -> float:
+    if not math.isfinite(number(name, value)):
         raise ValueError(f"{name}: takes finite numbers")
-    return float(number)
+    return float(value)
 
 
 def _bound(bound: str, floor: float) -> Any:
@@ -227,8 +224,8 @@ def _bound(bound: str, floor: float) -> Any:
 
 def _missing(missing: str | float | None) -> dict[str, Any]:
     """What to do with missing samples, and the value that means "missing"."""
-    if isinstance(missing, (int, float)) and not isinstance(missing, bool):
-        return {"missing_value": _number(missing)}
+    if isinstance(missing, (int, float, np.number)) and not isinstance(missing, bool):
+        return {"missing_value": _number(float(missing))}
     if missing not in ("mask", "error", None):
         raise ValueError(f"missing: 'error' or 'mask', not \"{missing}\"")
     return {"missing": missing}
@@ -238,20 +235,20 @@ def _shard(shard: tuple[int, int] | None, knows_range: bool) -> str | None:
     """A shard in the library's words."""
     if shard is None:
         return None
-    number, count = shard
-    if not 1 <= number <= count:
+    index, count = (whole("shard", part) for part in pair("shard", "(I, N)", shard))
+    if not 1 <= index <= count:
         raise ValueError(f"shard: takes (I, N), the I-th of N, from (1, {count}) to ({count}, {count})")
     if not knows_range:
         raise ValueError("shard: needs range=... or max_error=..., since a shard does not know all frames")
-    return f"{number}/{count}"
+    return f"{index}/{count}"
 
 
 def _of_variable(name: str, given: float | dict[str, float] | None, variable: str | None) -> float | None:
     if not isinstance(given, dict):
-        return None if given is None else float(given)
+        return None if given is None else number(name, given)
     if variable not in given:
         raise ValueError(f"{name}: has no entry for {variable or 'an array without a name'}; it has {', '.join(given)}")
-    return float(given[variable])
+    return number(name, given[variable])
 
 
 def told(report: str | None, notes: list[str]) -> dict[str, Any]:
@@ -272,108 +269,3 @@ def _caller() -> int:
 
 def _is_of_xarray(source: Any) -> bool:
     return type(source).__module__.split(".")[0] == "xarray"
-
-
-def _numbers(times: Any, unit: str | None) -> tuple[list[float] | None, str | None]:
-    """Times as numbers. Datetimes count seconds since the first of them."""
-    if times is None:
-        return None, unit
-    times = np.asarray(times)
-    if np.issubdtype(times.dtype, np.datetime64):
-        since = times.reshape(-1)[0].astype("datetime64[s]")
-        unit = f"seconds since {str(since).replace('T', ' ')}"
-        times = (times - since) / np.timedelta64(1, "s")
-    return [float(time) for time in times], unit
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Frames as parts of bytes, one after another."""
-
-    dims: list[int]
-    """Voxels along x, y and z; then frames, if their number is known."""
-    sample: str
-    parts: Iterator[npt.NDArray[np.uint8]]
-
-    @classmethod
-    def of(cls, source: Any, memory: int) -> Frames:
-        """Those of an array, or of an iterable of frames."""
-        if hasattr(source, "shape") and hasattr(source, "dtype") and hasattr(source, "__getitem__"):
-            return cls._of_array(source, memory)
-        if isinstance(source, (str, bytes, PathLike)):
-            raise ValueError("source: takes arrays, not the name of a file; open it, say by xarray.open_dataset")
-        if not isinstance(source, Iterable):
-            raise ValueError(f"source: takes an array, a dataset or an iterable of frames, not {type(source).__name__}")
-        return cls._of_iterable(source)
-
-    @classmethod
-    def _of_array(cls, array: Any, memory: int) -> Frames:
-        shape = tuple(int(n) for n in array.shape)
-        if len(shape) not in (3, 4) or 0 in shape:
-            raise ValueError(f"source: takes an array (time, z, y, x) or (time, y, x), not one of shape {shape}")
-        frames, *voxels = shape
-        together = frames_together(shape, np.dtype(array.dtype).itemsize, _chunk(array), memory)
-        starts = range(0, frames, together)
-        parts = (_bytes(array[start : start + together], None) for start in starts)
-        return cls([*_three(voxels), frames], _sample(array.dtype), parts)
-
-    @classmethod
-    def _of_iterable(cls, frames: Iterable[Any]) -> Frames:
-        iterator = iter(frames)
-        first = next(iterator, None)
-        if first is None:
-            raise _wavesplat.InputError("source: is empty")
-        first = np.asarray(first)
-        if first.ndim not in (2, 3):
-            raise ValueError(f"source: frames are arrays (z, y, x) or (y, x), not of shape {first.shape}")
-        parts = (_bytes(frame, first) for frame in chain([first], iterator))
-        return cls(_three(list(first.shape)), _sample(first.dtype), parts)
-
-
-def _three(voxels: list[int]) -> list[int]:
-    """Voxels along x, y and z."""
-    return [*reversed(voxels), *[1] * (3 - len(voxels))]
-
-
-def _sample(dtype: Any) -> str:
-    dtype = np.dtype(dtype)
-    known = SAMPLES.get(f"{dtype.kind}{dtype.itemsize}")
-    if known is None:
-        raise ValueError(f"source: samples of type {dtype} are not supported; convert them by astype('float32')")
-    return known
-
-
-def _chunk(array: Any) -> tuple[int, ...] | None:
-    """Lengths of the pieces that an array is made of: Dask's or Zarr's."""
-    chunk = getattr(array, "chunksize", None) or getattr(array, "chunks", None)
-    if not isinstance(chunk, tuple) or not all(isinstance(n, (int, np.integer)) for n in chunk):
-        return None
-    return tuple(int(n) for n in chunk)
-
-
-_COPIES = 8
-"""The part of the memory that frames which are taken together may have: they are there several times while they are made."""
-
-
-def frames_together(shape: tuple[int, ...], itemsize: int, chunk: tuple[int, ...] | None, memory: int) -> int:
-    """How many frames are best taken together: whole chunks, as far as the memory allows; at least one."""
-    frame = int(np.prod(shape[1:], dtype=np.int64)) * itemsize
-    most = max(memory // _COPIES // max(frame, 1), 1)
-    along = chunk[0] if chunk else 1
-    return max(most // along * along, min(along, most), 1)
-
-
-def _bytes(frames: Any, like: npt.NDArray[Any] | None) -> npt.NDArray[np.uint8]:
-    """The bytes of frames, x fastest."""
-    if isinstance(frames, np.ma.MaskedArray):
-        raise ValueError("source: masked arrays are ambiguous; convert array.filled(np.nan) with missing='mask'")
-    array = np.asarray(frames)
-    if like is not None and (array.shape, array.dtype) != (like.shape, like.dtype):
-        what = f"a frame is {array.dtype} of shape {array.shape}"
-        raise _wavesplat.InputError(f"source: {what}, but the first one is {like.dtype} of shape {like.shape}")
-    return little_endian(array).reshape(-1).view(np.uint8)
-
-
-def little_endian(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The same numbers, contiguous, in the byte order of files."""
-    return np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))

@@ -11,11 +11,15 @@ import numpy.typing as npt
 import xarray as xr
 
 from . import _wavesplat
-from ._convert import Conversion, _chunk, frames_together, little_endian, told
+from ._convert import Conversion, told
+from ._frames import _chunk, frames_together, little_endian
 from ._progress import Progress, reporting
 
 NAME = "%n"
 """What stands for the name of a variable in the name of a file."""
+
+_VALID = ("valid_range", "valid_min", "valid_max")
+_PACKED = ("scale_factor", "add_offset")
 
 _OF_STORAGE = ("units", "calendar", "dtype")
 """Encodings of coordinates that say how dates become numbers. Others say how a file stored them."""
@@ -44,15 +48,14 @@ def convert_dataset(
     for name in names:
         conversion.allowed.of_variable(name)  # so that none is written if one lacks an entry
     for name in names:
-        of_name = replace(conversion, path=conversion.path.replace(NAME, name.replace("/", "_")))
+        of_name = replace(conversion, path=conversion.path.replace(NAME, name))
         reports[name] = _one(dataset, name, of_name, axes, progress)
     return reports
 
 
 def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
     if isinstance(source, xr.DataArray):
-        name = "data" if source.name is None else source.name
-        return source.to_dataset(name=name)
+        return source.to_dataset(name="data" if source.name is None else str(source.name))
     if not isinstance(source, xr.Dataset):
         raise ValueError(f"source: takes a DataArray or a Dataset, not {type(source).__name__}")
     return source
@@ -60,7 +63,17 @@ def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
 
 def _volumes(dataset: xr.Dataset) -> list[str]:
     """The variables that can be frames."""
-    return [str(name) for name, array in dataset.data_vars.items() if array.ndim >= 3 and array.dtype.kind in "fiu"]
+    found = [name for name, array in dataset.data_vars.items() if array.ndim >= 3 and array.dtype.kind in "fiub"]
+    return [_checked(name) for name in found]
+
+
+def _checked(name: Hashable) -> str:
+    """A name that a file can have: a slash would separate groups."""
+    if not isinstance(name, str):
+        raise ValueError(f"source: names are texts, not {name!r}; give another one by rename")
+    if "/" in name:
+        raise ValueError(f"source: the name {name!r} has a slash, which separates groups; give another one by rename")
+    return name
 
 
 def _one(
@@ -68,6 +81,9 @@ def _one(
 ) -> dict[str, Any]:
     if name not in dataset.data_vars:
         raise ValueError(f"variable: there is no {name!r}; the dataset has {', '.join(map(str, dataset.data_vars))}")
+    dtype = dataset[name].dtype
+    if dtype.kind not in "fiub":
+        raise ValueError(f"variable: {name!r} has values of type {dtype}, which are no samples; convert them by astype")
     encoded, attrs = _encoded(dataset, name)
     unlimited = set(dataset.encoding.get("unlimited_dims", ()))
     memory = conversion.request["memory"]
@@ -87,11 +103,15 @@ def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], di
     """The variables that a NetCDF file of this variable would have. Lazy arrays stay lazy."""
     kept = [key for key, array in dataset.data_vars.items() if key == name or array.ndim < 3]  # such as bounds of axes
     alone = dataset[kept].copy()  # not the data
+    if any(of in dataset[name].encoding for of in _PACKED):  # valid ranges count the numbers that were stored
+        alone[name].attrs = {of: value for of, value in alone[name].attrs.items() if of not in _VALID}
     for key, var in alone.variables.items():
         encoding = {} if key == name else {of: var.encoding[of] for of in _OF_STORAGE if of in var.encoding}
         alone[key].encoding = encoding if _is_date(var) else {}
     variables, attrs = xr.conventions.encode_dataset_coordinates(alone)
     ordered = [key for key in dataset.variables if key in variables]  # as in a file of the whole dataset
+    for key in {*ordered, *alone.dims}:
+        _checked(str(key))
     encoded = {str(key): xr.conventions.encode_cf_variable(variables[key], name=key) for key in ordered}
     return encoded, attrs
 
@@ -110,6 +130,7 @@ def _described(key: str, variable: xr.Variable, unlimited: set[Any], memory: int
         "dimensions": [(str(dim), int(length), dim in unlimited) for dim, length in lengths],
         "chunk": _chunks(variable, memory) if is_samples else None,
         "attributes": _attributes(variable.attrs),
+        "is_decoded": is_samples and not any(name in variable.attrs for name in _PACKED),
         "values": _values(variable.values) if is_small and not is_samples else None,
     }
 

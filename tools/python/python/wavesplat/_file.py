@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _wavesplat
+from ._arguments import located, whole
 from ._description import Axes, coordinates
 from ._figure import Figure
 from ._index import read_into, select
@@ -26,11 +27,12 @@ MEMORY = 512 << 20
 
 
 def open(path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None) -> File:
-    """Opens a coefficient file. Samples are read when they are asked for. Blocks that were decoded stay in memory for the
-    next reads and pictures, up to 256 MiB, until the file is gone.
+    """Opens a coefficient file, until `File.close` or the end of a ``with``. Samples are read when they are asked for. Blocks
+    that were decoded stay in memory for the next reads and pictures, up to 256 MiB, until the file is closed or gone.
 
     Args:
         path: A ``.wspl`` file, or the address of one: ``https://host/run.wspl`` or ``s3://bucket/run.wspl``, as a string.
+            ``file:///folder/run.wspl`` is a path, too.
         lod: Level of detail: every 2**lod-th voxel along each axis, read from the coarse levels alone.
         cache_dir: A folder that keeps what was read of remote files, up to 4 GiB. Several processes may share it.
 
@@ -49,21 +51,52 @@ class File:
     ``f[10, :, ::2, 5]`` gives samples as numpy does for basic indices and one list or mask, and ``f.oindex`` takes one along
     each axis. Only the blocks that an index touches are read, and the interpreter's lock is released meanwhile. Voxels are in
     the file's own order: along each axis, coordinates ascend. ``xarray.open_dataset`` gives the order of the source.
+
+    A process that was forked reads and draws with threads of its own, one call at a time. It cannot convert if its parent
+    used wavesplat before, and nothing at all if other threads used it at that moment: then there is a RuntimeError.
     """
 
     def __init__(
         self, path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None
     ) -> None:
         """As `wavesplat.open`."""
-        if lod < 0:
+        if whole("lod", lod) < 0:
             raise ValueError(f"lod: takes 0 or more, not {lod}")
-        self._path, self._lod, self._cache_dir = os.fspath(path), lod, cache_dir
-        self._file = _wavesplat.File(self._path, lod, cache_dir)
+        self._path, self._lod, self._cache_dir = located(path), lod, cache_dir
+        self._native: _wavesplat.File | None = _wavesplat.File(self._path, lod, cache_dir)
+        self._process = os.getpid()
+
+    @property
+    def _file(self) -> _wavesplat.File:
+        """The open file. A forked process connects to a server by itself: its parent uses the connection."""
+        if self._native is None:
+            raise ValueError(f"{self._path}: is closed")
+        if self._process != os.getpid() and "://" in self._path:
+            self._native = _same(self._path, self._lod, self._native.id, self._cache_dir)._file
+            self._process = os.getpid()
+        return self._native
+
+    def close(self) -> None:
+        """Closes the file and frees what is kept of it. Its samples cannot be read any more."""
+        self._native = None
+
+    @property
+    def closed(self) -> bool:
+        """Whether it is closed."""
+        return self._native is None
+
+    def __enter__(self) -> File:  # noqa: D105
+        return self
+
+    def __exit__(self, *raised: object) -> None:  # noqa: D105
+        self.close()
 
     def __reduce__(self) -> tuple[Any, ...]:  # noqa: D105
-        return _reopened, (anywhere(self._path), self._lod, self.id, self._cache_dir)
+        return _same, (anywhere(self._path), self._lod, self.id, self._cache_dir)
 
     def __repr__(self) -> str:  # noqa: D105
+        if self.closed:
+            return f"<wavesplat.File {self._path!r}: closed>"
         sizes = ", ".join(f"{name}: {length}" for name, length in zip(self.dims, self.shape, strict=True))
         name = self.variable or "samples"
         return f"<wavesplat.File {self._file.path!r}: {name} ({sizes}) {self.dtype}, error <= {self.bound:.4g}>"
@@ -250,9 +283,12 @@ class File:
             DamagedError: A block is damaged.
 
         """
+        memory, channel = whole("memory", memory), whole("channel", channel)
         selection = select((t, z, y, x), self.shape, outer=True)
         if out is None:
             return selection.finish(self._read(selection.items, channel=channel, memory=memory))
+        if not isinstance(out, np.ndarray):
+            raise TypeError(f"out: takes an array of numpy, not {type(out).__name__}")
         if not out.flags.writeable:
             raise ValueError("out: cannot be written")
         if out.shape != selection.shape or out.dtype != self.dtype:
@@ -350,7 +386,7 @@ class File:
             options: As for `render`, for all pictures.
 
         """
-        if not 0 <= port < 1 << 16:
+        if not 0 <= whole("port", port) < 1 << 16:
             raise ValueError(f"port: takes 0 to 65535, not {port}")
         return Viewer(self._file.view(request(options), port, str(memory)), browser=browser)
 
@@ -419,12 +455,13 @@ class Viewer:
 
 def anywhere(path: str) -> str:
     """A path that other processes understand: absolute, unless it is an address."""
+    path = located(path)
     return path if "://" in path else os.path.abspath(path)
 
 
-def _reopened(path: str, lod: int, id: str, cache_dir: str | PathLike[str] | None) -> File:
-    """A file that was pickled, if it is still the same."""
+def _same(path: str, lod: int, id: str, cache_dir: str | PathLike[str] | None) -> File:
+    """A file that is opened again, if it is still the same."""
     file = File(path, lod=lod, cache_dir=cache_dir)
     if file.id != id:
-        raise _wavesplat.ChangedError(f"{file._file.path}: is another file than the one that was pickled")
+        raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled or opened before")
     return file

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ._arguments import pair, whole
+
 REPEATED = ("view", "slice", "probe", "probe_region")
 """Options that have several values."""
 
@@ -26,7 +28,7 @@ def _field(name: str, value: Any) -> Any:
     if name in REPEATED:
         texts = [_text(name, one) for one in (value if isinstance(value, list) else [value])]
         return [one for text in texts for one in text.split(",")] if name == "slice" else texts
-    if isinstance(value, (int, float, np.number)) and name != "frames":
+    if isinstance(value, (int, float, np.number)) and name not in ("frames", "size"):
         return value.item() if isinstance(value, np.generic) else value
     return _text(name, value)
 
@@ -43,7 +45,7 @@ def _text(name: str, value: Any) -> str:
             raise ValueError("frames: none are chosen")
         return ",".join(str(int(frame)) for frame in frames)
     if name == "size" and not isinstance(value, str):
-        return "x".join(str(int(side)) for side in value)
+        return "x".join(str(whole("size", side)) for side in pair("size", "(WIDTH, HEIGHT)", value))
     if isinstance(value, dict):  # numbers are coordinates, texts such as "50%" and "#12" are what the program takes
         return ",".join(f"{key}={one if isinstance(one, str) else '@' + _number(one)}" for key, one in value.items())
     if isinstance(value, (tuple, list, np.ndarray)):

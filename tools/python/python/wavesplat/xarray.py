@@ -12,6 +12,7 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
+from ._arguments import located
 from ._convert import convert
 from ._description import ROLES, along_axis, array, attributes, kept
 from ._file import File, anywhere, open
@@ -54,6 +55,7 @@ class WavesplatBackend(BackendEntrypoint):
 
     description = "Open coefficient files (.wspl) of wavesplat"
     url = "https://docs.rs/wavesplat"
+    supports_groups: ClassVar[bool] = True  # of which a file has one
     open_dataset_parameters: ClassVar[tuple[str, ...]] = (
         "filename_or_obj",
         "drop_variables",
@@ -61,42 +63,68 @@ class WavesplatBackend(BackendEntrypoint):
         "decode_times",
         "decode_timedelta",
         "decode_coords",
+        "use_cftime",
+        "concat_characters",
         "lod",
         "cache_dir",
     )
 
-    def open_dataset(  # type: ignore[override]
+    def open_dataset(
         self,
-        filename_or_obj: str | os.PathLike[str],
+        filename_or_obj: Any,
         *,
         drop_variables: str | Iterable[str] | None = None,
         mask_and_scale: bool = True,
         decode_times: Any = True,
         decode_timedelta: Any = None,
         decode_coords: Any = True,
+        use_cftime: bool | None = None,
+        concat_characters: bool = True,
         lod: int = 0,
         cache_dir: str | os.PathLike[str] | None = None,
     ) -> xr.Dataset:
         """The dataset of a file or an address; with ``lod``, every 2**lod-th voxel along each axis."""
-        file = open(filename_or_obj, lod=lod, cache_dir=cache_dir)
+        file = open(_place(filename_or_obj), lod=lod, cache_dir=cache_dir)
         variables, attrs = _variables(file)
         dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
         variables = {name: var for name, var in variables.items() if name not in dropped}
+        given: dict[str, Any] = {} if use_cftime is None else {"use_cftime": use_cftime}
         dataset: xr.Dataset = xr.conventions.decode_cf(
             xr.Dataset(variables, attrs=attrs),
             mask_and_scale=mask_and_scale,
             decode_times=decode_times,
             decode_timedelta=decode_timedelta,
             decode_coords=decode_coords,
+            concat_characters=concat_characters,
+            **given,
         )
         dataset.encoding["source"] = anywhere(file.path)
         return dataset
+
+    def open_groups_as_dict(self, filename_or_obj: Any, **options: Any) -> dict[str, xr.Dataset]:
+        """The one group of a file."""
+        return {"/": self.open_dataset(filename_or_obj, **options)}
+
+    def open_datatree(self, filename_or_obj: Any, **options: Any) -> xr.DataTree:
+        """A tree of one node."""
+        return xr.DataTree.from_dict(self.open_groups_as_dict(filename_or_obj, **options))
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
         """Whether a name ends like one of a coefficient file."""
         return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).split("?")[0].endswith(
             ".wspl"
         )
+
+
+def _place(of: Any) -> str:
+    """The path or address of what xarray is given: itself, or that of an open file."""
+    if not hasattr(of, "read"):
+        return located(of)
+    known = (getattr(of, name, None) for name in ("url", "path", "name"))
+    place = next((one for one in known if isinstance(one, str) and ("://" in one or os.path.isfile(one))), None)
+    if place is None:
+        raise TypeError(f"filename_or_obj: takes a path or an address, not {of!r}: files are read by parts")
+    return place
 
 
 def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
