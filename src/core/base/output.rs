@@ -126,7 +126,7 @@ impl Output {
     }
 
     /// Says that another program writes the unfinished file. It is ended before the file is removed.
-    pub fn set_helper(&self, helper: Helper) {
+    pub fn set_helper(&self, helper: &Helper) {
         if let Some(part) = self.part() {
             unfinished::set_helper(part, helper);
         }

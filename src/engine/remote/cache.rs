@@ -308,7 +308,7 @@ mod tests {
         object.store(1, &[9; 1000]);
         assert_eq!((object.load(1, 1000), object.load(2, 1000)), (Some(vec![9; 1000]), Some(vec![8; 1000])));
         assert_eq!(fs::read(&moved).expect("a file")[0], 7, "the link went, and not what it led to");
-        fs::rename(&object.folder, &moved.with_extension("d")).expect("writable");
+        fs::rename(&object.folder, moved.with_extension("d")).expect("writable");
         std::os::unix::fs::symlink(moved.with_extension("d"), &object.folder).expect("a link");
         object.remove(1);
         object.store(3, &[9; 1000]);

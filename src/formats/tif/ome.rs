@@ -37,7 +37,7 @@ pub(super) fn parse(said: &str) -> Parsed<Stack> {
             Event::Start(e) | Event::Empty(e) => element(&e, &mut stack)?,
             Event::Eof => {
                 let stack: Stack = stack.ok_or("has OME-XML without <Pixels>")?;
-                return Ok(with_stamps(stack, stamps));
+                return Ok(with_stamps(stack, &stamps));
             }
             _ => {}
         }
@@ -61,7 +61,7 @@ fn stamp(e: &BytesStart<'_>, stamps: &mut Stamps) -> Parsed<()> {
 
 /// Gives the frames the times of their planes, if no step is said and each has one that is later than the one before, in one
 /// unit.
-fn with_stamps(stack: Stack, stamps: Stamps) -> Stack {
+fn with_stamps(stack: Stack, stamps: &Stamps) -> Stack {
     let times: Vec<f64> = stamps.values().map(|(time, _)| *time).collect();
     let Some((_, unit)) = stamps.get(&0).filter(|_| stamps.keys().copied().eq(0..stack.frames)) else { return stack };
     let is_one_unit = stamps.values().all(|(_, other)| other == unit);

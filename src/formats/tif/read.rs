@@ -78,7 +78,7 @@ impl Described<'_> {
                 (Stack::along(&axes)?, note)
             }
             (Some(letters), own) => {
-                let stack = Stack::along(&named(axes, Some(pages).filter(|pages| *pages > 1), letters)?)?;
+                let stack = Stack::along(&named(&axes, Some(pages).filter(|pages| *pages > 1), letters)?)?;
                 let own = own.unwrap_or_else(|| stack.clone());
                 let Stack { spacing, space_unit, interval, stamps, .. } = own;
                 (Stack { spacing, space_unit, interval, stamps, ..stack }, None)

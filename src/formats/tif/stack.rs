@@ -156,7 +156,7 @@ pub(super) fn guessed(mut axes: Vec<Counts>) -> Advised<(Vec<Counts>, Option<Not
 
 /// Gives axes the meaning of the user's letters. There is a letter for each axis, perhaps without those of length 1; or
 /// three letters, of all pages and of the axes of a page.
-pub(super) fn named(axes: Vec<Counts>, pages: Option<usize>, letters: &str) -> Advised<Vec<Counts>> {
+pub(super) fn named(axes: &[Counts], pages: Option<usize>, letters: &str) -> Advised<Vec<Counts>> {
     let count = letters.chars().count();
     let lengths: Vec<usize> = axes.iter().map(|axis| axis.length).collect();
     let several: Vec<usize> = lengths.iter().copied().filter(|length| *length != 1).collect();

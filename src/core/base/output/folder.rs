@@ -157,6 +157,7 @@ pub fn commit_together(folder: Option<OutputFolder>, mut files: Vec<Output>) -> 
     }
     files.iter().try_for_each(|file| file.rename(&all))?;
     drop(all);
+    drop(folder); // removes what is left under its unfinished name
     files.iter().try_for_each(Output::sync_name)
 }
 

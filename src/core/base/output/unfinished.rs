@@ -36,7 +36,7 @@ pub(super) fn add(path: &Path, all: &mut AllUnfinished) -> Arc<AtomicBool> {
 }
 
 /// Says which program writes a file.
-pub(super) fn set_helper(path: &Path, helper: Helper) {
+pub(super) fn set_helper(path: &Path, helper: &Helper) {
     all().iter_mut().filter(|one| one.path == path).for_each(|one| one.helper = Some(helper.clone()));
 }
 

@@ -78,7 +78,7 @@ impl Movie {
         let messages = thread::spawn(move || stderr.map(last_of).unwrap_or_default());
         let pictures = ffmpeg.stdin.take();
         let ffmpeg = Arc::new(Mutex::new(ffmpeg));
-        out.set_helper(ffmpeg.clone());
+        out.set_helper(&ffmpeg);
         Ok(Self { out, ffmpeg, pictures, messages })
     }
 
