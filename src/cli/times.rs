@@ -151,7 +151,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn endless_files_are_refused() {
-        assert!(read(Path::new("/dev/zero")).expect_err("endless").to_string().contains("line 1: is too long"));
+        assert!(read(Path::new("/dev/zero")).expect_err("endless").to_string().contains("is a device"));
     }
 
     #[test]
