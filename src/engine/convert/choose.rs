@@ -148,8 +148,15 @@ impl SchemeSelector<'_> {
     fn smallest<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
         let boxes = self.boxes()?;
         let families = self.families(&self.order(&boxes))?;
-        let trials = Trials { boxes: self.transformed::<R>(&families, &boxes), idle: Pool::default() };
-        let families: Vec<_> = families.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
+        let (mut learned, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|f| f.basis == Basis::Learned);
+        let mut trials = Trials { boxes: self.transformed::<R>(&others, &boxes), idle: Pool::default() };
+        let others: Vec<_> = others.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
+        // Making long functions orthonormal takes a time of the cube of their length: only if they can win.
+        let least = others.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
+        learned.retain(|scheme| bytes_of_functions(scheme) < least);
+        trials.boxes.extend(self.transformed(&learned, &boxes));
+        let learned = learned.into_iter().map(|scheme| self.tried(scheme, &trials));
+        let families: Vec<_> = learned.chain(others).collect();
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
         let promising = families.into_iter().filter(|f| f.0 <= least * PROMISING);
         if let Some(before) = self.before {
@@ -292,7 +299,7 @@ impl SchemeSelector<'_> {
         let SchemeConstraint { basis, space } = self.config.coding;
         let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
-            None => (self.frames() > 1 && self.can_learn()).then_some(Basis::Learned), // the others are never the smallest
+            None => (self.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
             Some(Basis::Samples) => None,
             forced => forced,
         };
@@ -320,13 +327,6 @@ impl SchemeSelector<'_> {
             found.dedup();
         }
         Ok(found)
-    }
-
-    /// Whether learning takes less time than coding. Long functions of few voxels would take more bytes than they save,
-    /// too.
-    fn can_learn(&self) -> bool {
-        let (frames, voxels) = (self.frames(), self.archive.grid.dims.iter().product::<usize>() * self.channels.len());
-        frames <= QUICKLY_LEARNED || voxels.saturating_mul(VOXELS_LEARNED) >= frames.saturating_mul(frames)
     }
 
     /// The learned functions, from rows all over the volume instead of the boxes used for trials.
@@ -405,7 +405,7 @@ impl SchemeSelector<'_> {
         };
         let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         let whole = self.archive.grid.dims.iter().product::<usize>() * self.channels.len();
-        bytes as f64 * whole as f64 / voxels as f64 + 2.0 * scheme.functions.len() as f64
+        bytes as f64 * whole as f64 / voxels as f64 + bytes_of_functions(scheme)
     }
 
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
@@ -414,6 +414,11 @@ impl SchemeSelector<'_> {
         codec.missing_value = self.config.missing_value;
         codec
     }
+}
+
+/// Bytes that describe the functions of a scheme.
+fn bytes_of_functions(scheme: &Scheme) -> f64 {
+    (size_of::<i16>() * scheme.functions.len()) as f64
 }
 
 /// The scheme with fewer bytes; the first if equal.
@@ -445,13 +450,6 @@ const LARGEST_SHARE: usize = 8;
 /// The number of rows that functions are learned from, and the number of the first position.
 const ROWS: usize = 64;
 const LEARNING: usize = 1000;
-
-/// Functions of windows up to this length are always learned. The time it takes grows with the cube of the length.
-const QUICKLY_LEARNED: usize = 128;
-
-/// A window of n frames needs n^2 divided by this many voxels, so that learning longer functions takes less time than
-/// coding.
-const VOXELS_LEARNED: usize = 64;
 
 /// A scheme is tuned only if its estimate is at most this many times the smallest.
 const PROMISING: f64 = 1.3;

@@ -215,7 +215,7 @@ impl SampleSink for FileSink<'_> {
         let Some(path) = &self.files.last else { return Ok(()) };
         let mut out = Output::create(path, self.force)?;
         self.write_last(&mut out).map_err(|e| Error::io(path, "writing", e))?;
-        commit_together(self.folder.take(), self.complete.take().into_iter().chain([out]).collect())
+        commit_together(self.folder.as_ref(), self.complete.take().into_iter().chain([out]).collect())
     }
 }
 

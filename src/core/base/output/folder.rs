@@ -80,7 +80,7 @@ impl OutputFolder {
 
     /// Gives everything its final name.
     pub fn commit(self) -> Result<()> {
-        commit_together(Some(self), Vec::new())
+        commit_together(Some(&self), Vec::new())
     }
 
     fn commit_in(&self, _all: &AllUnfinished) -> Result<()> {
@@ -146,10 +146,10 @@ impl Drop for OutputFolder {
 
 /// Gives a folder and files their final names, in this order, once all of them are on disk. Meanwhile no signal ends the
 /// program, so that they are all there or none.
-pub fn commit_together(folder: Option<OutputFolder>, mut files: Vec<Output>) -> Result<()> {
+pub fn commit_together(folder: Option<&OutputFolder>, mut files: Vec<Output>) -> Result<()> {
     files.iter_mut().try_for_each(Output::complete)?;
     let mut all = all();
-    if let Some(folder) = &folder {
+    if let Some(folder) = folder {
         folder.commit_in(&all)?;
         if folder.takes == Takes::Whole {
             all.retain(|one| !one.is(&folder.part));
@@ -157,7 +157,6 @@ pub fn commit_together(folder: Option<OutputFolder>, mut files: Vec<Output>) -> 
     }
     files.iter().try_for_each(|file| file.rename(&all))?;
     drop(all);
-    drop(folder); // removes what is left under its unfinished name
     files.iter().try_for_each(Output::sync_name)
 }
 
