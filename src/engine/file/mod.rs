@@ -17,8 +17,8 @@ pub mod report;
 pub mod verify;
 pub mod recover;
 pub mod repack;
-pub mod merge;
 pub mod resume;
+pub mod merge;
 
 pub use coefficient_file::{CoefficientFile, time_labels};
 pub(crate) use decoded::DecodedBlock;

@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 /// How long to wait for a lock: a killed process may hold it a little longer.
 const WAIT: Duration = Duration::from_secs(1);
 
+/// The system's error for a lock that needs a file open for writing, as NFS does: folders never are.
+const EBADF: i32 = 9;
+
 /// Opens and locks the file or folder `part`, unfinished of `path`, and repeats this until it is the one of that name:
 /// between the two, its last owner may have renamed or removed it.
 pub(super) fn locked(path: &Path, part: &Path, open: impl Fn() -> io::Result<File>) -> Result<(File, AllUnfinished)> {
@@ -42,7 +45,7 @@ pub(super) fn locked(path: &Path, part: &Path, open: impl Fn() -> io::Result<Fil
 
 /// Whether the file system has no locks; NFS has none of folders.
 fn is_unsupported(error: &io::Error) -> bool {
-    error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(libc::EBADF)
+    error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(EBADF)
 }
 
 /// The process that has locked a file, if the system tells.
