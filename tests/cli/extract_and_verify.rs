@@ -165,7 +165,7 @@ fn a_coarse_lattice_is_every_few_voxels() {
     work.wavesplat("extract a.wspl --lod 4 -o b.npy").fails(2, &["--lod", "takes at most 3", "blocks of 8"]);
     work.wavesplat("extract a.wspl --lod 2 -o b.nrrd").ok();
     let nrrd = work.read("b.nrrd");
-    let spacing = nrrd.windows(7).any(|word| word == b"(4,0,0)");
+    let spacing = nrrd.windows(9).any(|word| word == b"(4,0,0,0)");
     assert!(spacing, "{}", String::from_utf8_lossy(&nrrd[..400]));
 }
 
