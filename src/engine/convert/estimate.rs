@@ -34,7 +34,7 @@ const WINDOWS: usize = 3;
 const LEAST_BLOCKS: usize = 4;
 
 /// Archives of at most this many samples are estimated with the same care for every tolerance. For larger ones all
-/// estimates together take no longer than a conversion.
+/// estimates together code no more blocks than a conversion.
 const FEW_SAMPLES: usize = 1 << 22;
 
 /// The estimated size of an archive's coefficient file.
