@@ -1,6 +1,6 @@
 //! The order of frames by the numbers in file names, and frames that are missing by these.
 //!
-//! [`names`] reads the numbers, [`order`] decides which of them counts frames.
+//! [`names`] reads the numbers, [`order()`] decides which of them counts frames.
 
 mod dates;
 mod names;
