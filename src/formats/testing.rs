@@ -3,11 +3,28 @@
 pub(crate) use wavesplat_core::source::testing::{DIMS, check_source, check_window, message, payload, value};
 
 use crate::open::open;
+use flate2::Compression;
+use flate2::write::{GzEncoder, ZlibEncoder};
 use std::fs;
+use std::io::Write;
 use std::path::PathBuf;
 use wavesplat_core::base::mapped::Access;
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::source::OpenOptions;
+
+/// The bytes, packed by gzip.
+pub(crate) fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(bytes).expect("packing");
+    packed.finish().expect("packing")
+}
+
+/// The bytes, packed by zlib.
+pub(crate) fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(bytes).expect("packing");
+    packed.finish().expect("packing")
+}
 
 /// A folder that vanishes with the test.
 pub(crate) struct Folder(tempfile::TempDir);

@@ -1,10 +1,7 @@
 //! Tests of MetaImage files.
 
 use crate::open;
-use crate::testing::{Folder, check_inputs, payload, refused, survives_damage};
-use flate2::Compression;
-use flate2::write::{GzEncoder, ZlibEncoder};
-use std::io::Write;
+use crate::testing::{Folder, check_inputs, gzip, payload, refused, survives_damage, zlib};
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::source::OpenOptions;
 
@@ -19,12 +16,6 @@ fn header(axes: usize, fields: &str, data: &str) -> String {
 
 fn local(fields: &str, payload: &[u8]) -> Vec<u8> {
     [header(4, fields, "LOCAL").as_bytes(), payload].concat()
-}
-
-fn zlib(bytes: &[u8]) -> Vec<u8> {
-    let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
-    packed.write_all(bytes).expect("packing");
-    packed.finish().expect("packing")
 }
 
 #[test]
@@ -48,9 +39,7 @@ fn samples_may_be_elsewhere() {
     let (ty, all) = (SampleType::I16, payload(SampleType::I16, 0..4, false));
     folder.write("all of it.raw", &all);
     folder.write("skip.raw", [b"123", all.as_slice()].concat());
-    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
-    packed.write_all(&all).expect("packing");
-    folder.write("all.gz", packed.finish().expect("packing"));
+    folder.write("all.gz", gzip(&all));
     for t in 0..4 {
         folder.write(&format!("f {:02}.raw", 3 * t + 1), payload(ty, t..t + 1, false));
         folder.write(&format!("p{}.raw", t + 1), payload(ty, t..t + 1, false));

@@ -1,10 +1,7 @@
 //! Tests of NIfTI files.
 
 use crate::open;
-use crate::testing::{Folder, check_inputs, message, payload, refused, survives_damage};
-use flate2::Compression as Level;
-use flate2::write::GzEncoder;
-use std::io::Write;
+use crate::testing::{Folder, check_inputs, gzip, message, payload, refused, survives_damage};
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::source::{Archive, OpenOptions};
 
@@ -93,12 +90,6 @@ const TYPES: [(i16, SampleType); 8] = [
 
 fn options() -> OpenOptions {
     OpenOptions::default()
-}
-
-fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut packed = GzEncoder::new(Vec::new(), Level::fast());
-    packed.write_all(bytes).expect("packing");
-    packed.finish().expect("packing")
 }
 
 /// Four frames of 16 bits, version 1.

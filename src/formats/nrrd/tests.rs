@@ -1,18 +1,9 @@
 //! Tests of NRRD files.
 
 use crate::open;
-use crate::testing::{Folder, check_inputs, message, payload, refused, survives_damage};
-use flate2::Compression as Level;
-use flate2::write::GzEncoder;
-use std::io::Write;
+use crate::testing::{Folder, check_inputs, gzip, message, payload, refused, survives_damage};
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::source::OpenOptions;
-
-fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut packed = GzEncoder::new(Vec::new(), Level::fast());
-    packed.write_all(bytes).expect("packing");
-    packed.finish().expect("packing")
-}
 
 fn options() -> OpenOptions {
     OpenOptions::default()

@@ -1,10 +1,7 @@
 //! The user's letters for the axes of every format, and what files say of their axes.
 
 use super::open;
-use crate::testing::{DIMS, Folder, check_inputs, payload, refused};
-use flate2::Compression;
-use flate2::write::{GzEncoder, ZlibEncoder};
-use std::io::Write;
+use crate::testing::{DIMS, Folder, check_inputs, gzip, payload, refused, zlib};
 use std::path::PathBuf;
 use wavesplat_core::base::npy::write_header;
 use wavesplat_core::base::sample::SampleType;
@@ -68,18 +65,6 @@ fn nifti(dim: &[i16], bytes: &[u8]) -> Vec<u8> {
     head[108..112].copy_from_slice(&352_f32.to_le_bytes());
     head[344..348].copy_from_slice(b"n+1\0");
     [head, bytes.to_vec()].concat()
-}
-
-fn gzip(bytes: &[u8]) -> Vec<u8> {
-    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
-    packed.write_all(bytes).expect("packing");
-    packed.finish().expect("packing")
-}
-
-fn zlib(bytes: &[u8]) -> Vec<u8> {
-    let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
-    packed.write_all(bytes).expect("packing");
-    packed.finish().expect("packing")
 }
 
 #[test]

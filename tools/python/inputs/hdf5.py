@@ -7,6 +7,7 @@ import numpy as np
 
 from . import hdf5_kinds
 from .case import FRAMES, NAME, ORIGIN, SPACING, STEP, TIMES, UNITS, Case, Refused, axes, by, frame, frames
+from .hdf5_kinds import group
 
 FOLDER = "hdf5"
 H5PY = by("h5py")
@@ -57,14 +58,6 @@ def write(folder: Path) -> list:
         *hdf5_kinds.write(folder),
         *refused(folder),
     ]
-
-
-def group(file: h5py.File, path: str) -> h5py.Group:
-    """The group, made if need be; those on the way would note the time of day if h5py were left to make them."""
-    found = file
-    for name in path.split("/"):
-        found = found[name] if name in found else found.create_group(name)
-    return found
 
 
 def stored(folder: Path) -> list:

@@ -4,11 +4,9 @@ mod pieced;
 
 use super::count::Count;
 use crate::open;
-use crate::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value};
+use crate::testing::{Folder, check_inputs, check_window, payload, refused, survives_damage, value, zlib as packed};
 use ::base64::Engine;
 use ::base64::engine::general_purpose::STANDARD;
-use flate2::write::ZlibEncoder;
-use std::io::Write;
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::source::OpenOptions;
 
@@ -282,14 +280,7 @@ fn an_oblique_direction_is_noted_and_frames_must_agree() {
 
 /// An array as VTK compresses it, in blocks of so many bytes: what stands before them, and all of them.
 fn zlib(samples: &[u8], count: Count, block: usize) -> [Vec<u8>; 2] {
-    let blocks: Vec<Vec<u8>> = samples
-        .chunks(block)
-        .map(|block| {
-            let mut packed = ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
-            packed.write_all(block).expect("packing");
-            packed.finish().expect("packing")
-        })
-        .collect();
+    let blocks: Vec<Vec<u8>> = samples.chunks(block).map(packed).collect();
     let sizes = blocks.iter().map(Vec::len);
     let before = [blocks.len(), block, samples.len() % block].into_iter().chain(sizes);
     [before.flat_map(|n| stored_count(n, count)).collect(), blocks.concat()]
