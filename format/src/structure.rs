@@ -4,7 +4,7 @@
 use crate::directory::BlockEntry;
 use crate::header::HEADER;
 use crate::leaf::LeafEntry;
-use crate::limits::align;
+use crate::limits::{ALIGN, align};
 use crate::reader::Reader;
 use crate::section::{FRAME, SectionExtent, SectionId, frame, read, read_checked};
 use crate::{Error, Result, Storage};
@@ -109,7 +109,7 @@ impl<S: Storage> Reader<S> {
     }
 }
 
-/// Checks that the bytes from `from` to the next multiple of 64 are zero.
+/// Checks that the bytes from `from` to the next multiple of [`ALIGN`] are zero.
 pub(crate) fn check_padding(storage: &impl Storage, from: u64) -> Result<()> {
     let corrupt = |what: &str| Error::Corrupt { offset: from, place: "padding".into(), what: what.into() };
     if align(from) > storage.len() {
@@ -117,8 +117,9 @@ pub(crate) fn check_padding(storage: &impl Storage, from: u64) -> Result<()> {
     }
     let range = from..align(from);
     read_checked(storage, std::slice::from_ref(&range), || {
-        let mut padding = vec![0; (range.end - from) as usize];
-        storage.read_at(from, &mut padding)?;
+        let mut padding = [0; ALIGN as usize];
+        let padding = &mut padding[..(range.end - from) as usize];
+        storage.read_at(from, padding)?;
         if padding.iter().all(|&byte| byte == 0) { Ok(()) } else { Err(corrupt("not zero")) }
     })
 }

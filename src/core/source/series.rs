@@ -310,6 +310,11 @@ impl Series {
     }
 }
 
+/// The error of a window that ends after the last of `all` frames.
+pub fn too_many_frames(first: usize, count: usize, all: usize) -> Error {
+    Error::setting("frames", format!("{count} from {first} were asked for, but there are {all}"))
+}
+
 impl FrameSource for Series {
     fn archive(&self) -> &Archive {
         &self.archive
@@ -323,7 +328,7 @@ impl FrameSource for Series {
         let all = self.archive.frames.unwrap_or(0);
         let span = count.checked_sub(1).map_or(Some(0), |gaps| gaps.checked_mul(step)?.checked_add(1));
         let Some(end) = span.and_then(|span| first.checked_add(span)).filter(|end| *end <= all) else {
-            return Err(Error::setting("frames", format!("{count} from {first} were asked for, but there are {all}")));
+            return Err(too_many_frames(first, count, all));
         };
         let mut window = Frames { shape: self.shape, bytes: Vec::new(), frames: Vec::new() };
         let mut spool = Spool::default();

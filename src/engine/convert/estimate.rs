@@ -83,10 +83,8 @@ pub fn estimates(
     let windows = some_windows(frames, first.config.window);
     let is_rough = source_archive.grid.whole().voxels().saturating_mul(frames) > FEW_SAMPLES;
     let all = plan.blocks.len().saturating_mul(frames.div_ceil(first.config.window));
-    let blocks = match is_rough {
-        true => some_blocks(&plan.blocks, blocks_of_window(all, windows.len() * configs.len())),
-        false => some_blocks(&plan.blocks, BLOCKS),
-    };
+    let most = if is_rough { blocks_of_window(all, windows.len() * configs.len()) } else { BLOCKS };
+    let blocks = some_blocks(&plan.blocks, most);
     progress.start(Some((windows.len() * configs.len()) as u64));
     let read = FramesRead {
         archive: &source_archive,

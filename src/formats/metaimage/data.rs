@@ -113,10 +113,8 @@ impl Data<'_> {
     fn part(&self, file: &FileBytes, header: u64, frames: usize) -> Result<Part> {
         let refused = |e| Error::input(file.path(), e);
         let start = self.start(file, header, self.samples.lengths[2], frames)?;
-        let layout = match self.samples.is_usual() {
-            true => self.samples.layout().with_frames(frames),
-            false => self.samples.layout(),
-        };
+        let whole = self.samples.layout();
+        let layout = if self.samples.is_usual() { whole.with_frames(frames) } else { whole };
         let (path, state) = (file.path(), file.state());
         if self.samples.compressed {
             let stream = deflated::Stream { compression: Compression::at(file, start)?, start, skip: 0 };

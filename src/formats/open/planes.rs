@@ -4,7 +4,7 @@ use crate::numbering::Planes;
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
-use wavesplat_core::source::series::{Series, check_grid, override_grid};
+use wavesplat_core::source::series::{Series, check_grid, override_grid, too_many_frames};
 use wavesplat_core::source::{Archive, FrameSource, FrameWindow, OpenOptions, times};
 
 /// Opens files of planes, frame after frame and in each from the first plane to the last. `first` is the first of them.
@@ -53,8 +53,7 @@ impl FrameSource for Stacked {
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
         let frames = self.archive.frames.unwrap_or(0);
         if first.checked_add(count).is_none_or(|end| end > frames) {
-            let what = format!("{count} from {first} were asked for, but there are {frames}");
-            return Err(Error::setting("frames", what));
+            return Err(too_many_frames(first, count, frames));
         }
         let window = self.source.window(first * self.planes, count * self.planes)?;
         Ok(Box::new(StackedWindow { window, planes: self.planes, sample_size: self.archive.sample.size() }))

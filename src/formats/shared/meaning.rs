@@ -13,7 +13,7 @@ pub(crate) enum Kind {
     /// Voxels along x (0), y (1) or z (2).
     Voxels(usize),
     Frames,
-    /// Anything else, of which one is chosen.
+    /// Anything else; one of them is chosen.
     Components,
 }
 
@@ -108,28 +108,29 @@ impl Meaning {
         (0..self.kinds.len()).rev().map(letter).collect()
     }
 
-    /// The array, of which one component is meant.
+    /// How one component of the array is stored, with its voxels along the world's axes.
     pub(crate) fn layout(&self, placed: &Placed, component: usize) -> Layout {
         let voxels = self.voxels();
-        let axis = |(axis, len): (usize, &usize)| match voxels.iter().position(|of| *of == axis) {
-            Some(a) => {
-                let (of, backwards) = placed.axes[a];
-                Axis { backwards, ..Axis::new(AxisRole::of_voxels(of), *len) }
-            }
-            None if self.kinds[axis] == Kind::Frames => Axis::new(AxisRole::Frames, *len),
-            None => Axis::single(if *len > 1 { component } else { 0 }, *len),
-        };
-        Layout(self.sizes.iter().enumerate().map(axis).rev().collect())
+        self.laid_out(component, |axis| {
+            let (of, backwards) = placed.axes[voxels.partition_point(|before| *before < axis)];
+            Axis { backwards, ..Axis::new(AxisRole::of_voxels(of), self.sizes[axis]) }
+        })
     }
 
-    /// The array with its voxels along the axes that the letters name, of which one component is meant.
+    /// How one component of the array is stored, with its voxels along the axes that the letters name.
     pub(crate) fn plain_layout(&self, component: usize) -> Layout {
-        let axis = |(kind, len): (&Kind, &usize)| match kind {
-            Kind::Voxels(letter) => Axis::new(AxisRole::of_voxels(*letter), *len),
-            Kind::Frames => Axis::new(AxisRole::Frames, *len),
-            Kind::Components => Axis::single(if *len > 1 { component } else { 0 }, *len),
+        let letter = |axis: usize| self.letter(axis).unwrap_or(0);
+        self.laid_out(component, |axis| Axis::new(AxisRole::of_voxels(letter(axis)), self.sizes[axis]))
+    }
+
+    /// As above, with what `of_voxels` says of each axis of voxels.
+    fn laid_out(&self, component: usize, of_voxels: impl Fn(usize) -> Axis) -> Layout {
+        let axis = |axis: usize| match (self.kinds[axis], self.sizes[axis]) {
+            (Kind::Voxels(_), _) => of_voxels(axis),
+            (Kind::Frames, len) => Axis::new(AxisRole::Frames, len),
+            (Kind::Components, len) => Axis::single(if len > 1 { component } else { 0 }, len),
         };
-        Layout(self.kinds.iter().zip(&self.sizes).map(axis).rev().collect())
+        Layout((0..self.kinds.len()).rev().map(axis).collect())
     }
 
     /// Where voxels are, by the step along each stored axis that is known. Letters that are not in the order of x, y, z go
