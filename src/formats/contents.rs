@@ -198,6 +198,6 @@ pub(super) mod testing {
         for irregular in [&[0.0, 0.1, 0.3][..], &[3.0, 2.0, 1.0], &[1.0, 1.0], &[7.0], &[]] {
             assert_eq!(regular(irregular), None, "{irregular:?}");
         }
-        assert_eq!(Contents { numbered: true, ..contents() }.regular_times(), None, "nobody gave them");
+        assert_eq!(Contents { numbered: true, ..contents() }.regular_times(), None, "no times were given");
     }
 }

@@ -1,5 +1,5 @@
-//! Connections. Those that have not shown the token yet give way to newer ones, so that nobody without it keeps its
-//! holders out. Nobody may be slow.
+//! Connections. Newer ones replace those that have not shown the token yet, so that clients without it cannot keep its
+//! holders out. Slow clients are disconnected.
 
 use std::collections::VecDeque;
 use std::io;

@@ -13,7 +13,7 @@ fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
     FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A folder that nobody else may read. Dropping it removes it with all files in it.
+/// A folder that only its owner may read. Dropping it removes it with all its files.
 #[derive(Debug)]
 pub struct TemporaryFolder(TempDir);
 

@@ -17,7 +17,8 @@
 //!
 //! Under eq 22, with samples of at least the floor, the relative error of a pixel is at most the tolerance: this bounds
 //! what [Dobashi](crate::bibliography) calls E_rel (eq 10). Eq 23 bounds the mean over a window alone: one frame may be
-//! off by sqrt(T) delta. Missing samples have no error and count in no mean. `sampled` is eq 23 with a delta from random pixels: an estimate (`convert::sampled`).
+//! off by sqrt(T) delta. Missing samples have no error and count in no mean. `sampled` is eq 23 with a delta from random
+//! pixels: an estimate (`convert::sampled`).
 //!
 //! Rounding every coefficient by at most step / 2 moves a sample by at most gain step / 2, hence
 //!
@@ -177,7 +178,8 @@ impl ErrorBound {
         }
     }
 
-    /// An upper bound of the largest share of `N` series of `frames` frames, none of them missing, from the sums of [`Self::add`].
+    /// An upper bound of the largest share of `N` series of `frames` frames, none of them missing, from the sums of
+    /// [`Self::add`].
     pub(crate) fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
         let largest = sums.iter().copied().fold(0.0, f64::max);
         match self.bound {

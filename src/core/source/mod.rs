@@ -194,7 +194,7 @@ impl Archive {
         }
     }
 
-    /// Whether its first `frames` frames have these times, or have none if there are none.
+    /// Whether the times of its first `frames` frames are these; true if neither has times.
     pub fn begins_with_times(&self, times: &[f64], frames: usize) -> bool {
         let count = frames.min(self.frames.unwrap_or(usize::MAX));
         let own = self.times_of(0..count);

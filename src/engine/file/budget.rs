@@ -3,7 +3,8 @@
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::memory::{FIXED, MOST_BLOCKS};
 
-/// The number of blocks that fit, if each takes `block` bytes of `memory`, of which a source takes `held`, a share.
+/// The number of blocks of `block` bytes each that fit in `memory`, beside the `held` bytes of a source. A source takes a
+/// share of the memory.
 ///
 /// # Errors
 /// Not even one fits; `doing` names the work.

@@ -1,4 +1,4 @@
-//! Variables of which each step is an array of its own: their paths differ in one number.
+//! Variables with an array for each step: the paths of these arrays differ in one number.
 
 use super::Variable;
 use std::collections::{BTreeMap, BTreeSet};

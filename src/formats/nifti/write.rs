@@ -199,7 +199,7 @@ mod tests {
         assert_eq!([1, 2, 3, 4].map(|i| header.real(76, i)), [0.5, 2.0, 1.0, 0.25]);
         assert_eq!((header.sform_code(), header.real(280, 3), header.real(280, 11)), (ALIGNED, -1.0, 7.5));
         let step = |contents: &Contents| written(contents).real(76, 4);
-        assert_eq!(step(&Contents { numbered: true, ..contents() }), 0.0, "nobody gave times");
+        assert_eq!(step(&Contents { numbered: true, ..contents() }), 0.0, "no times were given");
         let mut long = contents();
         long.grid.dims[0] = LONGEST_OF_FIRST + 1;
         let header = written(&long);

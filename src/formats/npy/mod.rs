@@ -1,4 +1,5 @@
-//! NumPy's `.npy`: one array, (z, y, x) or (t, z, y, x) or of the axes that the user says, in C or Fortran order. `base::npy` has its header.
+//! NumPy's `.npy`: one array, (z, y, x), (t, z, y, x) or with the axes that the user names, in C or Fortran order.
+//! `base::npy` has its header.
 
 mod read;
 

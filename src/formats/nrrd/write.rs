@@ -60,7 +60,7 @@ fn write_places(contents: &Contents, lattice: &Lattice, out: &mut dyn Write) -> 
     }
 }
 
-/// Writes the positions of voxels and frames in a space of which time is the fourth axis. Without regular times the
+/// Writes the positions of voxels and frames in a space whose fourth axis is time. Without regular times the
 /// axis of frames has no direction.
 fn write_places_and_times(contents: &Contents, lattice: &Lattice, out: &mut dyn Write) -> io::Result<()> {
     let [x, y, z] = lattice.steps().map(|step| joined(step.map(|along| along + 0.0), ","));

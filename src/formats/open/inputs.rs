@@ -149,7 +149,7 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Whether a path is a file, or a link of which nothing is known.
+/// Whether a path is a file, or a link that leads nowhere.
 fn may_be_file(path: &Path) -> bool {
     path.is_file() || is_lost(path)
 }

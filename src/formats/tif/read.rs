@@ -110,7 +110,7 @@ impl Described<'_> {
         Err(Note::with(text, Remedy::Set("axes")))
     }
 
-    /// Pages of which nothing is said.
+    /// Pages without a description.
     fn plain(&self) -> Vec<Counts> {
         let [x, y] = self.page.dims;
         let all = [('?', self.count), ('Y', y), ('X', x)].into_iter();

@@ -98,7 +98,7 @@ impl Stack {
         Layout(vec![Axis::new(AxisRole::Frames, 1), Axis::new(AxisRole::Z, self.planes), column, row])
     }
 
-    /// All pages one after another, of which one channel is meant.
+    /// All pages one after another, with one channel chosen.
     pub(super) fn contiguous(&self, dims: [usize; 2], channel: usize) -> Layout {
         let outer = [
             (Axis::new(AxisRole::Frames, self.frames), self.steps[0]),
