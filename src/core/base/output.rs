@@ -18,6 +18,7 @@ use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::process::Child;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -125,11 +126,10 @@ impl Output {
         }
     }
 
-    /// Says that another program writes the unfinished file. It is ended before the file is removed.
-    pub fn set_helper(&self, helper: &Helper) {
-        if let Some(part) = self.part() {
-            unfinished::set_helper(part, helper);
-        }
+    /// Starts a program that writes the unfinished file. It is ended before the file is removed. None for outputs
+    /// that are no files.
+    pub fn start_helper(&self, start: impl FnOnce(&Path) -> io::Result<Child>) -> Option<io::Result<Helper>> {
+        self.part().map(|part| unfinished::start_helper(part, || start(part)))
     }
 
     /// Cuts an unfinished file to its first `bytes`, and continues writing after them.

@@ -1,6 +1,7 @@
 //! The unfinished files and folders of this process, for programs that end early.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,9 +36,12 @@ pub(super) fn add(path: &Path, all: &mut AllUnfinished) -> Arc<AtomicBool> {
     keep
 }
 
-/// Says which program writes a file.
-pub(super) fn set_helper(path: &Path, helper: &Helper) {
-    all().iter_mut().filter(|one| one.path == path).for_each(|one| one.helper = Some(helper.clone()));
+/// Starts the program that writes a file. Whoever removes the file knows of the program as soon as it runs.
+pub(super) fn start_helper(path: &Path, start: impl FnOnce() -> io::Result<Child>) -> io::Result<Helper> {
+    let mut all = all();
+    let helper = Arc::new(Mutex::new(start()?));
+    all.iter_mut().filter(|one| one.path == path).for_each(|one| one.helper = Some(helper.clone()));
+    Ok(helper)
 }
 
 /// Forgets a file or folder. Its helper must be gone before it is removed, so it is ended here.

@@ -4,7 +4,7 @@ use super::{Picture, Rendered, SinkConfig};
 use std::io::{self, Read, Write};
 use std::path::Path;
 use std::process::{ChildStdin, Command, ExitStatus, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::PoisonError;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use wavesplat_core::base::error::{Error, Result};
@@ -70,16 +70,15 @@ impl Movie {
     /// # Errors
     /// Standard output, or a machine without ffmpeg.
     pub(super) fn new(out: Output, format: MovieFormat, config: &SinkConfig) -> Result<Self> {
-        let Some(part) = out.part() else {
+        let Some(started) = out.start_helper(|part| command(part, format, config).spawn()) else {
             return Err(Error::path(out.path(), "a movie needs a file, in which ffmpeg can move"));
         };
-        let mut ffmpeg = command(part, format, config).spawn().map_err(|e| not_started(out.path(), e))?;
-        let stderr = ffmpeg.stderr.take();
+        let helper = started.map_err(|e| not_started(out.path(), e))?;
+        let mut ffmpeg = helper.lock().unwrap_or_else(PoisonError::into_inner);
+        let (pictures, stderr) = (ffmpeg.stdin.take(), ffmpeg.stderr.take());
+        drop(ffmpeg);
         let messages = thread::spawn(move || stderr.map(last_of).unwrap_or_default());
-        let pictures = ffmpeg.stdin.take();
-        let ffmpeg = Arc::new(Mutex::new(ffmpeg));
-        out.set_helper(&ffmpeg);
-        Ok(Self { out, ffmpeg, pictures, messages })
+        Ok(Self { out, ffmpeg: helper, pictures, messages })
     }
 
     /// Sends one picture.
