@@ -16,7 +16,7 @@ Usage: tools/release/build.sh [OPTIONS] [archive] [wheel] [sources]
   -o DIR           the folder of the files [default: target/release-files]
   --programs DIR   take the programs of this folder instead of building them
   --profile NAME   the profile of the Python package [default: release, for Linux of 2014 and later]
-  --features LIST  further features of the Python package
+  --features LIST  features beyond the default ones, of the programs and the Python package [default: exr,zarr]
 TEXT
 }
 
@@ -24,7 +24,7 @@ root=$(realpath "$(dirname "$0")/../..")
 out=$root/target/release-files
 programs=
 profile=release
-features=
+features=exr,zarr
 parts=()
 while (($#)); do
     case $1 in
@@ -55,13 +55,22 @@ missing() {
     exit 1
 }
 
-# Builds the programs, which hold all that they need.
+# Installs programs by pip, in a folder of their own. They are found first from then on.
+pip_install() {
+    local python=$root/target/release-python
+    python3 -m venv "$python" && "$python/bin/pip" install --quiet "$@" ||
+        missing "this needs $*, which pip cannot install here"
+    PATH=$python/bin:$PATH
+}
+
+# Builds the programs, which hold all that they need. zig compiles their C and C++ for musl.
 build_programs() {
     [ -z "$programs" ] || return 0
     [ -d "$(rustc --print target-libdir --target "$target" 2>/dev/null)" ] ||
         missing "the programs need the standard library for musl: rustup target add $target"
-    command -v musl-gcc >/dev/null || missing "the programs need musl-gcc, in the package musl-tools of Debian"
-    cargo build --release --locked --target "$target" --target-dir target --bin wavesplat --bin wavesplat-render
+    pip_install cargo-zigbuild ziglang
+    cargo zigbuild --release --locked --features "$features" --target "$target" --target-dir target \
+        --bin wavesplat --bin wavesplat-render
     programs=$root/target/$target/release
 }
 
@@ -100,21 +109,20 @@ archive() {
 wheel() {
     rm -f "$out"/wavesplat-*.whl
     build_programs
-    local python=target/release-python tools=("maturin>=1.9,<2" wheel) linux=(--compatibility linux)
+    local tools=("maturin>=1.9,<2" wheel) linux=(--compatibility linux)
     if [ "$profile" = release ]; then # for Linux of 2014 and later
         tools+=(ziglang)
         linux=(--zig --compatibility manylinux2014)
     fi
-    python3 -m venv "$python" && "$python/bin/pip" install --quiet "${tools[@]}" ||
-        missing "the wheel needs ${tools[*]}, which pip cannot install here"
-    PATH="$PWD/$python/bin:$PATH" CARGO_TARGET_DIR="$PWD/target" "$python/bin/maturin" build --quiet --locked --strip \
-        --profile "$profile" --features "$features" "${linux[@]}" --manifest-path tools/python/Cargo.toml --out "$work/wheel"
-    "$python/bin/python" -m wheel unpack --dest "$work/unpacked" "$work"/wheel/*.whl
+    pip_install "${tools[@]}"
+    CARGO_TARGET_DIR=$root/target maturin build --quiet --locked --strip --profile "$profile" --features "$features" \
+        "${linux[@]}" --manifest-path tools/python/Cargo.toml --out "$work/wheel"
+    python -m wheel unpack --dest "$work/unpacked" "$work"/wheel/*.whl
     local folder=("$work"/unpacked/*)
     local inner=$folder/$(basename "$folder")
     install -D -s -t "$inner.data/scripts" "$programs/wavesplat" "$programs/wavesplat-render"
     install -D -m 644 -t "$inner.dist-info/licenses" "${licences[@]}"
-    "$python/bin/python" -m wheel pack --dest-dir "$out" "$folder"
+    python -m wheel pack --dest-dir "$out" "$folder"
 }
 
 sources() {
