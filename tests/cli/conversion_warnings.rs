@@ -153,14 +153,14 @@ fn a_few_voxels_over_a_long_time_need_longer_windows_and_are_no_noise() {
     for (dims, frames) in [([2, 2, 2], 3000), ([1, 1, 1], 4000), ([3, 2, 1], 2200)] {
         let work = Work::new();
         work.write("a.npy", Archive::of(dims, frames, |x, y, z, t| walk(t) + (x + 2 * y + 3 * z) as f32).npy());
-        let run = work.wavesplat("convert a.npy -o a.wspl").ok();
+        let run = work.wavesplat("convert a.npy -o a.wspl --window 32").ok();
         let said = warnings(&run);
         assert!(
             said.contains("larger than the samples: a window of 32 frames takes") && !said.contains("noise"),
             "{said}"
         );
         assert!(said.contains("try --window 512"), "{said}");
-        let longer = work.wavesplat("convert a.npy -o b.wspl --window 512").ok();
+        let longer = work.wavesplat("convert a.npy -o b.wspl").ok(); // the default
         assert!(!warnings(&longer).contains("larger"), "{}", longer.err);
         assert!(2 * work.read("b.wspl").len() < work.read("a.wspl").len());
         work.wavesplat("verify b.wspl --against a.npy").ok();

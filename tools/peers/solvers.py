@@ -109,7 +109,9 @@ def heat(frames, edge, random):
 def cavity(frames, edge, random):
     """The field E_z of modes in a conducting box, of many frequencies."""
     z, y, x = lattice(edge)
-    modes = [(*random.integers(1, 7, 3), *random.uniform(0, 2 * np.pi, 1), *random.uniform(0.2, 1, 1)) for _ in range(20)]
+    modes = [
+        (*random.integers(1, 7, 3), *random.uniform(0, 2 * np.pi, 1), *random.uniform(0.2, 1, 1)) for _ in range(20)
+    ]
     for frame in range(frames):
         field = 0
         for kz, ky, kx, phase, amplitude in modes:

@@ -25,25 +25,32 @@ pub(super) struct Plan<'a> {
     pub(super) batch: usize,
 }
 
-/// The default block edge in voxels. Without a pyramid at most 32, less for long windows, so that a block stays near 4
-/// MiB. With a pyramid up to 48, because larger blocks compress better, even beside small ones at the far faces; and a
-/// multiple of 16 allows coarse lattices.
+/// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
+/// because larger blocks compress better, even beside small ones at the far faces. A multiple of 16 allows coarse
+/// lattices. Blocks of thin volumes are wider, up to [`WIDEST`]; those of long windows have fewer voxels.
 fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usize {
-    let (largest, samples) =
-        if coding.space == SpatialPredictor::Alone { (32, 33 * 32 * 32 * 32) } else { (48, 33 * 48 * 48 * 48) };
-    let fits = |e: &usize| e * e * e * window <= samples;
-    let edge = [largest, largest / 2, largest / 4, 4, 2].into_iter().find(fits).unwrap_or(1);
+    let alone = coding.space == SpatialPredictor::Alone;
+    let usual = if alone { 32 } else { 48 };
+    let fits = |edge: &usize| clipped(*edge, dims).saturating_mul(window.max(32)) <= 33 * usual * usual * usual;
+    let wide = (2..=WIDEST / 16).rev().map(|edge| 16 * edge);
+    let edge = wide.chain([usual / 2, usual / 4, 4, 2]).find(fits).unwrap_or(1);
     let longest = dims.into_iter().max().unwrap_or(1);
-    if coding.space == SpatialPredictor::Alone { edge } else { longest.min(edge) }
+    if alone { edge } else { longest.min(edge) }
+}
+
+/// The widest blocks of thin volumes.
+const WIDEST: usize = 256;
+
+/// The voxels of the largest block.
+fn clipped(edge: usize, dims: [usize; 3]) -> usize {
+    dims.into_iter().map(|n| n.min(edge)).fold(1, usize::saturating_mul)
 }
 
 impl<'a> Plan<'a> {
     /// Whether blocks may have `edge` voxels a side.
-    fn takes(config: &ConvertConfig, edge: usize) -> bool {
-        let coefficients = most_coefficients(config) as u64;
-        edge > 0
-            && (edge as u64).saturating_pow(3).saturating_mul(coefficients)
-                <= wavesplat_format::limits::MAX_BLOCK_SAMPLES
+    fn takes(config: &ConvertConfig, edge: usize, dims: [usize; 3]) -> bool {
+        let samples = clipped(edge, dims).saturating_mul(most_coefficients(config)) as u64;
+        edge > 0 && samples <= wavesplat_format::limits::MAX_BLOCK_SAMPLES
     }
 
     /// A block, with the voxels around it that help to code it.
@@ -66,7 +73,7 @@ impl<'a> Plan<'a> {
         }
         let edge = config.block.unwrap_or(block_edge(config.coding, archive.grid.dims, config.window));
         let most = wavesplat_format::limits::MAX_BLOCK_SAMPLES;
-        if !Self::takes(config, edge) {
+        if !Self::takes(config, edge, archive.grid.dims) {
             return Err(Error::setting(
                 "block",
                 format!("holds 1 to {most} samples over a window, not {edge} voxels a side"),
@@ -83,12 +90,15 @@ impl<'a> Plan<'a> {
         Ok(Self { start: start(input, edge), colour_transform: colour_transform.as_ref(), blocks, batch })
     }
 
-    /// The plan of a file that has `count` blocks, side by side.
+    /// The plan of a file that has `count` blocks, side by side along the longest axis.
     pub(super) fn for_blocks(&self, count: usize) -> Self {
         let edge = self.blocks.edges[0];
-        let blocks = BlockGrid::cubes([edge * count, edge, edge], edge);
-        let start = Metadata { dims: blocks.dims.map(|n| n as u64), ..self.start.clone() };
-        Self { start, blocks, ..*self }
+        let mut dims = self.blocks.dims.map(|n| n.min(edge));
+        if let Some(longest) = dims.iter_mut().max() {
+            *longest *= count;
+        }
+        let start = Metadata { dims: dims.map(|n| n as u64), ..self.start.clone() };
+        Self { start, blocks: BlockGrid::cubes(dims, edge), ..*self }
     }
 
     pub(super) fn channels(&self) -> usize {
@@ -191,3 +201,29 @@ fn most_coefficients(config: &ConvertConfig) -> usize {
 /// An upper bound of the memory of a zstd context at the offered levels, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
 const MIB: f64 = 1_048_576.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_cubes_unless_the_volume_is_thin() {
+        let alone = SchemeConstraint::from(Basis::Haar);
+        for (coding, dims, window, edge) in [
+            (SchemeConstraint::AUTO, [1024, 1024, 1024], 32, 48),
+            (SchemeConstraint::AUTO, [1024, 1024, 1024], 4, 48),
+            (SchemeConstraint::AUTO, [1024, 1024, 1024], 256, 24),
+            (SchemeConstraint::AUTO, [20, 18, 16], 32, 20),
+            (SchemeConstraint::AUTO, [75, 75, 20], 32, 75),
+            (SchemeConstraint::AUTO, [1, 512, 512], 32, 256),
+            (SchemeConstraint::AUTO, [512, 8, 512], 32, 112),
+            (SchemeConstraint::AUTO, [512, 512, 8], 256, 32),
+            (alone, [1024, 1024, 1024], 32, 32),
+            (alone, [512, 512, 2], 32, 128),
+            (alone, [1024, 1024, 1024], 4096, 4),
+        ] {
+            assert_eq!(block_edge(coding, dims, window), edge, "{dims:?}, {window}");
+            assert!(clipped(edge, dims) * window <= wavesplat_format::limits::MAX_BLOCK_SAMPLES as usize);
+        }
+    }
+}

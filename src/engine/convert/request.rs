@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 use std::path::PathBuf;
 use wavesplat_core::base::choice;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::grid::Grid;
 use wavesplat_core::base::memory;
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{Archive, FrameSource};
@@ -45,7 +46,7 @@ pub struct ConvertRequest {
     /// Prediction in space: none (for haar, multi and learned), linear, cubic or auto. Default: what suits the basis.
     #[serde(with = "choice::optional")]
     pub space: Option<SpatialPredictor>,
-    /// Frames in a window. Default: 32, and 33 for the basis multi.
+    /// Frames in a window. Default: 32, up to 512 for at most 256 voxels; one more for the basis multi.
     pub window: Option<usize>,
     /// Voxels a side of a block. Default: as many as suit the window.
     pub block: Option<usize>,
@@ -153,7 +154,7 @@ impl ConvertRequest {
         Ok(ConvertConfig {
             coding: self.coding(),
             chain: self.chain,
-            window: self.window.unwrap_or(defaults.window + usize::from(self.basis == Some(Basis::Multi))),
+            window: self.window.unwrap_or_else(|| self.usual_window(defaults.window, archive.grid)),
             max_error: self.max_error.as_ref().map(of_variable).transpose()?,
             bound: self.bound,
             range: self.range,
@@ -169,11 +170,21 @@ impl ConvertRequest {
         })
     }
 
+    /// The default window: longer for a few series, which are small and predict each other little.
+    fn usual_window(&self, usual: usize, grid: Grid) -> usize {
+        let is_short = |window: &usize| window.saturating_mul(grid.whole().voxels()) <= FEW_SAMPLES;
+        let window = [512, 256, 128, 64].into_iter().find(is_short).unwrap_or(usual);
+        window + usize::from(self.basis == Some(Basis::Multi))
+    }
+
     fn coding(&self) -> SchemeConstraint {
         let suitable = self.basis.map_or(SchemeConstraint::AUTO, SchemeConstraint::from);
         SchemeConstraint { space: self.space.unwrap_or(suitable.space), ..suitable }
     }
 }
+
+/// The most samples of a window that is longer than usual.
+const FEW_SAMPLES: usize = 1 << 14;
 
 /// The words of a [`Bound`].
 #[derive(Deserialize)]
@@ -229,6 +240,16 @@ mod tests {
         assert_eq!(read("{}").expect("a request"), ConvertRequest::default());
         for wrong in [r#"{"tolerence": 1}"#, r#"{"shard": "3/2"}"#, r#"{"basis": "fourier"}"#, r#"{"bound": "best"}"#] {
             assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn windows_of_few_voxels_are_long() {
+        let multi = ConvertRequest { basis: Some(Basis::Multi), ..ConvertRequest::default() };
+        let grid = |dims| Grid { dims, spacing: [1.0; 3], origin: [0.0; 3] };
+        for (dims, frames) in [([2, 2, 2], 512), ([4, 4, 4], 256), ([16, 16, 1], 64), ([16, 17, 1], 32)] {
+            assert_eq!(ConvertRequest::default().usual_window(32, grid(dims)), frames, "{dims:?}");
+            assert_eq!(multi.usual_window(32, grid(dims)), frames + 1, "{dims:?}");
         }
     }
 
