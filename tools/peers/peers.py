@@ -7,12 +7,14 @@
     python3 peers.py generate plate vortex --out data/
     python3 peers.py measure data/plate.npy --tolerances 1e-2,1e-3 --repeats 3
 
-generate writes float32 archives (t, z, y, x) as KIND.npy:
+generate writes archives (t, z, y, x) of float32, or of whole numbers, as KIND.npy:
 
     plate     |J| of eddy currents that decay in a plate, 75x75x20 voxels, 32 frames
     plate_fe  the same, every voxel off by 0.2 %, always alike: rough in space, smooth in time
     vortex    Gaussians in decaying turbulence, no empty space, 64x64x64 voxels, 64 frames
     cloud     turbulent blobs in nothing (exactly 0), 96x96x96 voxels, 64 frames
+
+and those of small solvers and imitated scans in solvers.py, from reaction to grains.
 
 measure prints a line of JSON for every file, tolerance and peer:
 

@@ -98,7 +98,7 @@ def smoke(frames, edge, random):
 def heat(frames, edge, random):
     """Boxes of temperatures that diffuse."""
     field = np.zeros((edge,) * 3, np.float32)
-    for low, value in zip(random.integers(0, edge // 2, (8, 3)), random.uniform(-1, 1, 8)):
+    for low, value in zip(random.integers(0, edge // 2, (8, 3)), random.uniform(-1, 1, 8), strict=True):
         field[tuple(slice(a, a + edge // 3) for a in low)] += value
     for _ in range(frames):
         for _ in range(5):
@@ -166,7 +166,10 @@ def ocean(frames, edge, random):
     eddies = [smooth_noise(random, shape, (1, 3, 3)) for _ in range(2)]
     base = 35 - 2 * np.exp(-np.arange(8) / 2)[:, None, None]
     for frame in range(frames):
-        carried = (ndimage.shift(e, (0, 0, s * frame), order=1, mode="grid-wrap") for e, s in zip(eddies, (0.4, -0.25)))
+        carried = (
+            ndimage.shift(e, (0, 0, s * frame), order=1, mode="grid-wrap")
+            for e, s in zip(eddies, (0.4, -0.25), strict=True)
+        )
         yield np.where(land, np.nan, base + 0.3 * sum(carried))
 
 
@@ -176,7 +179,10 @@ def gauges(frames, edge, random):
     phases_of = random.uniform(0, 1, (3, *shape))
     for hour in range(frames):
         surge = 0.98 * surge + 0.05 * random.standard_normal(shape)
-        tides = (a * np.sin(2 * np.pi * (hour / p + f)) for a, p, f in zip((1, 0.4, 0.2), (12.42, 12, 25.8), phases_of))
+        tides = (
+            a * np.sin(2 * np.pi * (hour / p + f))
+            for a, p, f in zip((1, 0.4, 0.2), (12.42, 12, 25.8), phases_of, strict=True)
+        )
         yield sum(tides) + surge + 0.01 * random.standard_normal(shape)
 
 
@@ -202,28 +208,26 @@ def grains(frames, edge, random):
         yield np.where(far < 0.4 * frame + 1, seeds[tuple(nearest)], 0).astype(np.uint8)
 
 
-# Name: the generator, its frames, its voxels along an axis, and its seed.
+def seeded(generator, seed, **settings):
+    """The generator with its random numbers."""
+    return lambda frames, edge: generator(frames, edge, np.random.default_rng(seed), **settings)
+
+
+# Name: the generator, its frames and its voxels along an axis.
 KINDS = {
-    "reaction": (reaction, 32, 80, 1),
-    "sound": (sound, 32, 96, 2),
-    "layers": (lambda *of: sound(*of, layered=True), 32, 96, 3),
-    "shocks": (shocks, 32, 80, 4),
-    "phases": (phases, 32, 64, 5),
-    "smoke": (smoke, 32, 80, 6),
-    "heat": (heat, 48, 72, 7),
-    "cavity": (cavity, 64, 64, 8),
-    "distances": (distances, 48, 80, 9),
-    "heart": (heart, 40, 64, 10),
-    "weather": (weather, 365, 72, 11),
-    "ocean": (ocean, 60, 128, 12),
-    "gauges": (gauges, 7300, 2, 13),
-    "galaxies": (galaxies, 24, 80, 14),
-    "grains": (grains, 24, 64, 15),
+    "reaction": (seeded(reaction, 1), 32, 80),
+    "sound": (seeded(sound, 2), 32, 96),
+    "layers": (seeded(sound, 3, layered=True), 32, 96),
+    "shocks": (seeded(shocks, 4), 32, 80),
+    "phases": (seeded(phases, 5), 32, 64),
+    "smoke": (seeded(smoke, 6), 32, 80),
+    "heat": (seeded(heat, 7), 48, 72),
+    "cavity": (seeded(cavity, 8), 64, 64),
+    "distances": (seeded(distances, 9), 48, 80),
+    "heart": (seeded(heart, 10), 40, 64),
+    "weather": (seeded(weather, 11), 365, 72),
+    "ocean": (seeded(ocean, 12), 60, 128),
+    "gauges": (seeded(gauges, 13), 7300, 2),
+    "galaxies": (seeded(galaxies, 14), 24, 80),
+    "grains": (seeded(grains, 15), 24, 64),
 }
-
-
-def frames_of(kind, frames=None, edge=None, seed=None):
-    """The frames of a kind."""
-    generator, usual_frames, usual_edge, usual_seed = KINDS[kind]
-    random = np.random.default_rng(usual_seed if seed is None else seed)
-    return generator(frames or usual_frames, edge or usual_edge, random)
