@@ -4,6 +4,7 @@ use crate::file::CoefficientFile;
 use crate::file::budget::blocks_within;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::ops::Range;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::progress::Progress;
@@ -284,52 +285,63 @@ fn compare(
     let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
     let mut range = (f64::INFINITY, f64::NEG_INFINITY);
-    let (mut source, mut extracted) = (Series::new(codec), Series::new(codec));
-    for voxel in 0..voxels {
-        let (source, extracted) = (source.load(original, voxel), extracted.load(&bytes, voxel));
-        let errors = (voxel..samples).step_by(voxels).enumerate().filter_map(|(frame, i)| {
-            let missing = codec.is_missing(source[frame]);
-            if missing && same(i) {
-                found.missing += 1;
-                return None;
-            }
-            let (error, allowed) = if missing {
-                (f64::INFINITY, 0.0)
-            } else {
-                range = join_ranges(range, (extracted[frame], extracted[frame]));
-                let error = codec.error(splatted[i], extracted[frame], source[frame]);
-                (error, codec.bound.allowed(source[frame]))
-            };
-            Some(FrameError { frame, error, allowed })
-        });
-        let errors: Vec<FrameError> = errors.collect();
-        add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
+    let (mut source, mut extracted) = (Band::new(codec), Band::new(codec));
+    let mut errors = Vec::with_capacity(codec.frames());
+    for first in (0..voxels).step_by(Band::MOST) {
+        let band = first..voxels.min(first + Band::MOST);
+        source.load(original, &band);
+        extracted.load(&bytes, &band);
+        for voxel in band {
+            errors.clear();
+            errors.extend((voxel..samples).step_by(voxels).enumerate().filter_map(|(frame, i)| {
+                let (source, extracted) = (source.at(frame, voxel - first), extracted.at(frame, voxel - first));
+                let missing = codec.is_missing(source);
+                if missing && same(i) {
+                    found.missing += 1;
+                    return None;
+                }
+                let (error, allowed) = if missing {
+                    (f64::INFINITY, 0.0)
+                } else {
+                    range = join_ranges(range, (extracted, extracted));
+                    (codec.error(splatted[i], extracted, source), codec.bound.allowed(source))
+                };
+                Some(FrameError { frame, error, allowed })
+            }));
+            add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
+        }
     }
     (found, range)
 }
 
-/// The samples of one voxel.
-struct Series {
+/// The series of a few voxels that follow each other: frame after frame in memory, so that samples are converted in
+/// runs.
+struct Band {
     ty: SampleType,
-    bytes: Vec<u8>,
+    frames: usize,
     values: Vec<f64>,
 }
 
-impl Series {
+impl Band {
+    /// The most voxels of a band.
+    const MOST: usize = 64;
+
     fn new(codec: &WindowCodec) -> Self {
         let (ty, frames) = (codec.sample, codec.frames());
-        Self { ty, bytes: vec![0; frames * ty.size()], values: vec![0.0; frames] }
+        Self { ty, frames, values: vec![0.0; frames * Self::MOST] }
     }
 
-    /// Loads the series of a voxel of a block.
-    fn load(&mut self, block: &[u8], voxel: usize) -> &[f64] {
-        let (size, frames) = (self.ty.size(), self.values.len());
-        let frame = block.len() / frames;
-        for (sample, frame) in self.bytes.chunks_exact_mut(size).zip(block.chunks_exact(frame)) {
-            sample.copy_from_slice(&frame[voxel * size..][..size]);
+    /// Loads the series of some voxels of a block.
+    fn load(&mut self, block: &[u8], voxels: &Range<usize>) {
+        let (size, frame) = (self.ty.size(), block.len() / self.frames);
+        for (bytes, values) in block.chunks_exact(frame).zip(self.values.chunks_exact_mut(Self::MOST)) {
+            sample::load(self.ty, &bytes[voxels.start * size..voxels.end * size], &mut values[..voxels.len()]);
         }
-        sample::load(self.ty, &self.bytes, &mut self.values);
-        &self.values
+    }
+
+    /// The sample in a frame of the voxel with this number in the band.
+    fn at(&self, frame: usize, voxel: usize) -> f64 {
+        self.values[frame * Self::MOST + voxel]
     }
 }
 
