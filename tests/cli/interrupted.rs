@@ -161,12 +161,11 @@ fn output_of_several_files_is_all_there_or_not_at_all() {
             let name = if round % 2 == 0 { "INT" } else { "TERM" };
             let code = signalled(&work, line, part, name, Duration::from_micros(700 * (round % 12)));
             interrupts += usize::from(code != Some(0));
-            let expected: Vec<String> = match code {
-                Some(0) => before.iter().cloned().chain(outputs.iter().map(ToString::to_string)).collect(),
-                _ => before.clone(),
-            };
+            let whole: Vec<String> = before.iter().cloned().chain(outputs.iter().map(ToString::to_string)).collect();
+            let names = work.names();
             assert!(code == Some(0) || [130, 143].map(Some).contains(&code), "{line}: {code:?}");
-            assert_eq!(work.names(), expected, "{line}: {code:?}");
+            // A signal may come when the outputs have their names and the program has not ended.
+            assert!(names == whole || code != Some(0) && names == before, "{line}: {code:?}, {names:?}");
         }
         assert!(interrupts > 0, "{line}: always ended in time");
         without_output(&work, outputs);
