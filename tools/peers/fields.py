@@ -4,7 +4,6 @@ The same settings give the same samples. Coordinates run over 0..1, sampled at t
 """
 
 import numpy as np
-import solvers
 from scipy import fft
 
 PLATE_DIMS = (20, 75, 75)  # z, y, x: the size of the paper's experiment
@@ -127,12 +126,12 @@ KINDS = {
     "plate_fe": (lambda frames, edge: plate(frames, edge, ROUGHNESS), 32, None),
     "vortex": (vortex, 64, 64),
     "cloud": (cloud, 64, 96),
-} | solvers.KINDS
+}
 
 
 def write(kind, path, frames=None, edge=None):
-    """Writes a kind as one .npy (t, z, y, x): whole numbers as they are, others as float32."""
-    generator, usual_frames, usual_edge = KINDS[kind]
+    """Writes an entry of KINDS as one .npy (t, z, y, x): integers as they are, others as float32."""
+    generator, usual_frames, usual_edge = kind
     frames = frames or usual_frames
     array = None
     for number, frame in enumerate(generator(frames, edge or usual_edge)):

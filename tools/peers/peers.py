@@ -7,7 +7,7 @@
     python3 peers.py generate plate vortex --out data/
     python3 peers.py measure data/plate.npy --tolerances 1e-2,1e-3 --repeats 3
 
-generate writes archives (t, z, y, x) of float32, or of whole numbers, as KIND.npy:
+generate writes archives (t, z, y, x) of float32, or of integers, as KIND.npy:
 
     plate     |J| of eddy currents that decay in a plate, 75x75x20 voxels, 32 frames
     plate_fe  the same, every voxel off by 0.2 %, always alike: rough in space, smooth in time
@@ -42,8 +42,9 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 import numpy as np
 
 import fields
+import solvers
 
-KINDS = list(fields.KINDS)
+KINDS = fields.KINDS | solvers.KINDS
 PEERS = ["sz3-3d", "sz3-4d", "zfp-4d", "sperr-3d"]
 
 
@@ -71,9 +72,10 @@ def measure(path, tolerances, peers, repeats):
 
     series = np.ascontiguousarray(np.load(path))
     if series.dtype.kind in "iu" and series.dtype.itemsize <= 2:
-        series = series.astype(np.float32)  # exact; not all peers take whole numbers
+        series = series.astype(np.float32)  # exact; not all peers take integers
     if series.ndim != 4 or series.dtype not in (np.float32, np.float64):
-        sys.exit(f"{path}: peers take (t, z, y, x) of floats or at most 16 bits, this is {series.shape} {series.dtype}")
+        taken = "float32, float64 or integers of at most 16 bits"
+        sys.exit(f"{path}: peers take arrays (t, z, y, x) of {taken}, this is {series.shape} {series.dtype}")
     value_range = float(series.max()) - float(series.min())
     for tolerance in tolerances:
         bound = tolerance * value_range
@@ -109,7 +111,7 @@ def stay_on_one_core():
 def run_generate(args):
     os.makedirs(args.out, exist_ok=True)
     for kind in args.kinds:
-        fields.write(kind, os.path.join(args.out, kind + ".npy"), args.frames, args.edge)
+        fields.write(KINDS[kind], os.path.join(args.out, kind + ".npy"), args.frames, args.edge)
 
 
 def run_measure(args):

@@ -4,11 +4,12 @@ The same settings give the same samples. Fields are periodic where nothing else 
 """
 
 import numpy as np
+from fields import centres
 from scipy import fft, ndimage
 
 
 def shifted(field, axis, by):
-    """The field's neighbours along an axis."""
+    """The values `by` cells further along an axis."""
     return np.roll(field, -by, axis)
 
 
@@ -19,7 +20,7 @@ def laplacian(field):
 
 def lattice(edge):
     """Coordinates 0..1 along z, y and x, ready for broadcasting."""
-    along = (np.arange(edge, dtype=np.float32) + 0.5) / edge
+    along = centres(edge).astype(np.float32)
     return along[:, None, None], along[None, :, None], along[None, None, :]
 
 
@@ -135,7 +136,7 @@ def distances(frames, edge, random):
 
 
 def heart(frames, edge, random):
-    """A scan in whole numbers: a body, a chamber that beats, and the noise of the detector."""
+    """A scan in integers: a body, a chamber that beats, and the noise of the detector."""
     z, y, x = (2 * a - 1 for a in lattice(edge))
     for frame in range(frames):
         beat = 0.3 + 0.06 * np.sin(2 * np.pi * frame / 20)
@@ -148,7 +149,7 @@ def heart(frames, edge, random):
 
 
 def weather(frames, edge, random):
-    """Temperatures of a globe's surface: latitudes, mountains, seasons, and moving weather that forgets."""
+    """Temperatures of a globe's surface: latitudes, mountains, seasons, and weather that moves and decays."""
     shape = (1, edge, 2 * edge)
     latitude = np.linspace(-np.pi / 2, np.pi / 2, edge)[None, :, None]
     mountains = np.maximum(smooth_noise(random, shape, (0, 2, 2)), 0) ** 2
@@ -174,8 +175,8 @@ def ocean(frames, edge, random):
 
 
 def gauges(frames, edge, random):
-    """Water levels at a few places over years: tides, surges and noise. The edge is that of the places."""
-    shape, surge = (2, 2, 2), np.zeros((2, 2, 2))
+    """Water levels at a few places over years: tides, surges and noise."""
+    shape, surge = (edge,) * 3, np.zeros((edge,) * 3)
     phases_of = random.uniform(0, 1, (3, *shape))
     for hour in range(frames):
         surge = 0.98 * surge + 0.05 * random.standard_normal(shape)
@@ -200,7 +201,7 @@ def galaxies(frames, edge, random):
 
 
 def grains(frames, edge, random):
-    """Numbers of crystals that grow from seeds until they touch; 0 is the melt. Labels, not values."""
+    """Labels of crystals that grow from seeds until they touch; 0 is the melt."""
     seeds = np.zeros((edge,) * 3, np.uint8)
     seeds[tuple(random.integers(0, edge, (3, 150)))] = random.integers(1, 255, 150)
     far, nearest = ndimage.distance_transform_edt(seeds == 0, return_indices=True)

@@ -126,8 +126,8 @@ impl Output {
         }
     }
 
-    /// Starts a program that writes the unfinished file. It is ended before the file is removed. None for outputs
-    /// that are no files.
+    /// Starts a program that writes the unfinished file. It is ended before the file is removed. None if the
+    /// output is not a file.
     pub fn start_helper(&self, start: impl FnOnce(&Path) -> io::Result<Child>) -> Option<io::Result<Helper>> {
         self.part().map(|part| unfinished::start_helper(part, || start(part)))
     }

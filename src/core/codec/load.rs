@@ -59,8 +59,9 @@ pub(super) fn load_group(
     }
 }
 
-/// Loads the samples of `count` of `voxels` voxels, frame by frame; unused lanes are zero.
-fn load_lanes(codec: &WindowCodec, samples: &[u8], first: usize, count: usize, voxels: usize, out: &mut [Lane]) {
+/// Loads the samples of `count` of a block's `voxels` voxels, beginning with `first`: one lane for each frame. Unused
+/// elements of lanes are zero.
+pub fn load_lanes(codec: &WindowCodec, samples: &[u8], first: usize, count: usize, voxels: usize, out: &mut [Lane]) {
     let size = codec.sample.size();
     if count == LANES {
         return sample::load_strided(codec.sample, &samples[first * size..], voxels, out);

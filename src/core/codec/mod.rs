@@ -28,6 +28,8 @@ mod truncate;
 
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{ErrorBound, difference_up};
+pub use load::load_lanes;
+
 use crate::wavelet::{self, LANES, TimeBasis};
 use pyramid::PredictionPasses;
 use scheme::Scheme;
@@ -197,7 +199,7 @@ fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
 }
 
 /// Splits voxels into groups of [`LANES`]: (first voxel, number in the group).
-fn lane_groups(voxels: usize) -> impl Iterator<Item = (usize, usize)> {
+pub fn lane_groups(voxels: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..voxels).step_by(LANES).map(move |first| (first, LANES.min(voxels - first)))
 }
 

@@ -41,7 +41,7 @@ fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usiz
 /// The widest blocks of thin volumes.
 const WIDEST: usize = 256;
 
-/// The voxels of the largest block.
+/// The voxels of the largest block. Saturates, because the edge may be any.
 fn clipped(edge: usize, dims: [usize; 3]) -> usize {
     dims.into_iter().map(|n| n.min(edge)).fold(1, usize::saturating_mul)
 }
@@ -92,13 +92,12 @@ impl<'a> Plan<'a> {
 
     /// The plan of a file that has `count` blocks, side by side along the longest axis.
     pub(super) fn for_blocks(&self, count: usize) -> Self {
-        let edge = self.blocks.edges[0];
-        let mut dims = self.blocks.dims.map(|n| n.min(edge));
+        let mut dims = self.blocks.region(0).dims();
         if let Some(longest) = dims.iter_mut().max() {
             *longest *= count;
         }
         let start = Metadata { dims: dims.map(|n| n as u64), ..self.start.clone() };
-        Self { start, blocks: BlockGrid::cubes(dims, edge), ..*self }
+        Self { start, blocks: BlockGrid { dims, ..self.blocks }, ..*self }
     }
 
     pub(super) fn channels(&self) -> usize {

@@ -4,15 +4,15 @@ use crate::file::CoefficientFile;
 use crate::file::budget::blocks_within;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::ops::Range;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::progress::Progress;
-use wavesplat_core::base::sample::{self, SampleType, join_ranges};
-use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::base::sample::join_ranges;
 use wavesplat_core::codec::bound;
 use wavesplat_core::codec::decode::Block;
+use wavesplat_core::codec::{WindowCodec, lane_groups, load_lanes};
 use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
+use wavesplat_core::wavelet::Lane;
 use wavesplat_format::{BlockEntry, PartKind};
 
 /// The result of checking a file, with its source if one is given.
@@ -284,65 +284,33 @@ fn compare(
     let (bytes, splatted) = decoded.samples_and_values(codec);
     let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
-    let mut range = (f64::INFINITY, f64::NEG_INFINITY);
-    let (mut source, mut extracted) = (Band::new(codec), Band::new(codec));
-    let mut errors = Vec::with_capacity(codec.frames());
-    for first in (0..voxels).step_by(Band::MOST) {
-        let band = first..voxels.min(first + Band::MOST);
-        source.load(original, &band);
-        extracted.load(&bytes, &band);
-        for voxel in band {
+    let (mut missing, mut range) = (0, (f64::INFINITY, f64::NEG_INFINITY));
+    // The error of a sample, and what is allowed; none if it is missing in both.
+    let mut compared = |i: usize, source: f64, extracted: f64| {
+        if codec.is_missing(source) {
+            missing += u64::from(same(i));
+            return (!same(i)).then_some((f64::INFINITY, 0.0));
+        }
+        range = join_ranges(range, (extracted, extracted));
+        Some((codec.error(splatted[i], extracted, source), codec.bound.allowed(source)))
+    };
+    let lanes = vec![Lane::default(); codec.frames()];
+    let (mut source, mut extracted, mut errors) = (lanes.clone(), lanes, Vec::new());
+    for (first, count) in lane_groups(voxels) {
+        load_lanes(codec, original, first, count, voxels, &mut source);
+        load_lanes(codec, &bytes, first, count, voxels, &mut extracted);
+        for lane in 0..count {
+            let voxel = first + lane;
             errors.clear();
-            errors.extend((voxel..samples).step_by(voxels).enumerate().filter_map(|(frame, i)| {
-                let (source, extracted) = (source.at(frame, voxel - first), extracted.at(frame, voxel - first));
-                let missing = codec.is_missing(source);
-                if missing && same(i) {
-                    found.missing += 1;
-                    return None;
-                }
-                let (error, allowed) = if missing {
-                    (f64::INFINITY, 0.0)
-                } else {
-                    range = join_ranges(range, (extracted, extracted));
-                    (codec.error(splatted[i], extracted, source), codec.bound.allowed(source))
-                };
-                Some(FrameError { frame, error, allowed })
+            errors.extend((0..codec.frames()).filter_map(|frame| {
+                let found = compared(frame * voxels + voxel, source[frame][lane], extracted[frame][lane]);
+                found.map(|(error, allowed)| FrameError { frame, error, allowed })
             }));
             add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
         }
     }
+    found.missing = missing;
     (found, range)
-}
-
-/// The series of a few voxels that follow each other: frame after frame in memory, so that samples are converted in
-/// runs.
-struct Band {
-    ty: SampleType,
-    frames: usize,
-    values: Vec<f64>,
-}
-
-impl Band {
-    /// The most voxels of a band.
-    const MOST: usize = 64;
-
-    fn new(codec: &WindowCodec) -> Self {
-        let (ty, frames) = (codec.sample, codec.frames());
-        Self { ty, frames, values: vec![0.0; frames * Self::MOST] }
-    }
-
-    /// Loads the series of some voxels of a block.
-    fn load(&mut self, block: &[u8], voxels: &Range<usize>) {
-        let (size, frame) = (self.ty.size(), block.len() / self.frames);
-        for (bytes, values) in block.chunks_exact(frame).zip(self.values.chunks_exact_mut(Self::MOST)) {
-            sample::load(self.ty, &bytes[voxels.start * size..voxels.end * size], &mut values[..voxels.len()]);
-        }
-    }
-
-    /// The sample in a frame of the voxel with this number in the band.
-    fn at(&self, frame: usize, voxel: usize) -> f64 {
-        self.values[frame * Self::MOST + voxel]
-    }
 }
 
 /// The error of a sample in a frame of the window, and what is allowed.

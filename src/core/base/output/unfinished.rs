@@ -36,7 +36,7 @@ pub(super) fn add(path: &Path, all: &mut AllUnfinished) -> Arc<AtomicBool> {
     keep
 }
 
-/// Starts the program that writes a file. Whoever removes the file knows of the program as soon as it runs.
+/// Starts the program that writes a file. No file is removed meanwhile, so whoever removes this one can end the program.
 pub(super) fn start_helper(path: &Path, start: impl FnOnce() -> io::Result<Child>) -> io::Result<Helper> {
     let mut all = all();
     let helper = Arc::new(Mutex::new(start()?));
