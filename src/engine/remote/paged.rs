@@ -249,10 +249,15 @@ impl<S: Storage> Storage for Paged<S> {
 
     fn forget(&self, ranges: &[Range<u64>]) -> bool {
         let within = ranges.iter().map(|range| range.start..range.end.min(self.storage.len()));
-        for page in within.flat_map(|range| numbers(&range)) {
-            self.lock().held.remove(&page);
+        let wrong: Vec<u64> = within.flat_map(|range| numbers(&range)).collect();
+        // Another thread may be loading the wrong page from the disk: it would be kept after it was dropped here.
+        let is_loading = |pages: &mut Pages| wrong.iter().any(|page| pages.in_flight.contains(page));
+        let mut pages = self.arrived.wait_while(self.lock(), is_loading).unwrap_or_else(PoisonError::into_inner);
+        for page in wrong {
+            pages.held.remove(&page);
             self.on_disk.iter().for_each(|disk| disk.remove(page));
         }
+        drop(pages);
         self.storage.forget(ranges);
         true
     }
@@ -416,6 +421,28 @@ mod tests {
         assert_eq!(asked(&paged).concat(), std::slice::from_ref(&(3 * PAGE..5 * PAGE)), "only what was wrong");
         let later = Paged::new(Far { bytes: vec![0; right.len()], ..Far::default() }, Some(disk()));
         assert!(read(&later) == right, "the disk has the right bytes, too");
+    }
+
+    #[test]
+    fn wrong_pages_are_read_again_by_all_threads_that_share_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let disk = || Cache::new(folder.path(), 1 << 30).expect("a folder").object(Path::new("a"), b"", "", PAGE);
+        for round in 0..100 {
+            disk().store(0, &vec![0xFF; PAGE as usize]);
+            let paged = Paged { on_disk: Some(disk()), ..far(PAGE as usize) };
+            let is_right = || {
+                let mut read = vec![0; PAGE as usize];
+                paged.read_at(0, &mut read).expect("within");
+                read == paged.storage.bytes
+            };
+            thread::scope(|scope| {
+                (0..4).for_each(|_| {
+                    scope.spawn(|| {
+                        assert!(is_right() || paged.forget(std::slice::from_ref(&(0..PAGE))) && is_right(), "{round}");
+                    });
+                });
+            });
+        }
     }
 
     #[test]
