@@ -6,7 +6,7 @@
 use crate::coefficients::{Trial, doubles, views};
 use crate::common::random::Random;
 use crate::common::views::{SKEWED, archive, field, truth, values, view};
-use crate::common::{direct, looking, pictures, rendered, settings, stored};
+use crate::common::{direct, is_taken, looking, pictures, rendered, settings, stored};
 use crate::frame_pictures::{bits, under_less_memory};
 use crate::reference::splat::{BACKGROUND, Images};
 use wavesplat::base::grid::{Grid, Region};
@@ -89,9 +89,9 @@ fn samples(trial: &Trial) -> CoefficientScene {
 
 #[test]
 fn no_pixel_is_beyond_its_certificate() {
-    for trial in doubles() {
+    for (n, trial) in doubles().into_iter().enumerate() {
         let mut used = 0.0_f64;
-        for view in views() {
+        for (_, view) in views().into_iter().enumerate().filter(|(m, _)| is_taken(m + n, 3)) {
             let truth = Reference::new(&trial, view, None);
             used = used.max(truth.check(&mut coefficients(&trial), None));
             used = used.max(truth.check(&mut samples(&trial), None));

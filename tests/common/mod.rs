@@ -196,6 +196,11 @@ pub(crate) fn cases(all: usize) -> usize {
     asked_cases().map_or(all.div_ceil(8), |times| all * times)
 }
 
+/// Whether a sweep takes its case `number`: one in `share`, or all with `WAVESPLAT_CASES`.
+pub(crate) fn is_taken(number: usize, share: usize) -> bool {
+    asked_cases().is_some() || number.is_multiple_of(share)
+}
+
 /// Reports how many series were tried since `started`; fails if there are fewer than `least`.
 pub(crate) fn tried(series: usize, least: usize, started: Instant) {
     report(&format!("{series} series in {:.1?}", started.elapsed()));
