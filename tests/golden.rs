@@ -113,7 +113,7 @@ fn golden_files_are_repacked_with_the_same_samples() {
         fs::write(&path, &bytes).unwrap();
         let new = open(&path);
         let has_pyramid = new.metadata().windows.iter().any(|window| window.pyramid.is_some());
-        assert_eq!(new.metadata().packing() == Packing::Nested, has_pyramid, "{name}");
+        assert_eq!(new.metadata().features().packing == Packing::Nested, has_pyramid, "{name}");
         assert_eq!(totals(&new), totals(&old), "{name}");
         assert_eq!(verify(&new, None, MEMORY, &Silent).unwrap().damaged, u64::from(name == "lost"), "{name}");
         let new = if name == "lost" { new.skip_damaged().unwrap() } else { new };

@@ -123,7 +123,7 @@ fn a_file_of_a_million_blocks_is_opened_by_reading_a_thousandth() {
     let stats = BlockStats { step: 0.0, min, max, reached: 0.0, squared_error: 0.0, dropped: 0.0 };
     for block in 0..2_000_000 {
         let parts = vec![part.clone()];
-        writer.append(&EncodedBlock { id: BlockId { window: 0, block, channel: 0 }, stats, parts }).unwrap();
+        writer.append(&EncodedBlock { id: BlockId::new(0, 0, block), stats, parts }).unwrap();
     }
     writer.end_window(&WindowEnd { missing: 2_000_000, ..WindowEnd::empty(0) }).unwrap();
     let (file, summary) = writer.finish().unwrap();
@@ -132,7 +132,7 @@ fn a_file_of_a_million_blocks_is_opened_by_reading_a_thousandth() {
     let (opened, held) = (counted.read(), summary.bytes);
     report(&format!("2 million blocks: {opened} of {held} bytes read to open the file"));
     assert!(opened < held / 1000);
-    let last = BlockId { window: 0, block: 1_999_999, channel: 0 };
+    let last = BlockId::new(0, 0, 1_999_999);
     assert_eq!(reader.entry(last).unwrap().id, last);
     report(&format!("and {} more to find a block", counted.read() - opened));
     assert!(counted.read() < held / 1000, "one leaf more");

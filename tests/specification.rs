@@ -6,6 +6,7 @@ use crate::common::samples::{append, numbers};
 use crate::common::series::{Kind, Mask, volume};
 use crate::common::{Stored, extracted, report, settings, stored, times};
 use crate::reference::decode::{Pyramid, haar, learned, learned_functions, multi, number};
+use std::collections::HashMap;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound, ConvertConfig, SchemeConstraint, SpatialPredictor, Stencil};
@@ -16,7 +17,7 @@ use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::wavelet::{LANES, Lane, basis};
 use wavesplat_format::{Axis, Packing, Window};
-use wavesplat_format::{BlockEntry, PartKind};
+use wavesplat_format::{BlockEntry, BlockId, Metadata, PartKind};
 
 const AXES: [Axis; 4] = [Axis::X, Axis::Y, Axis::Z, Axis::T];
 
@@ -32,6 +33,7 @@ fn spelled_out(pyramid: &wavesplat_format::Pyramid) -> Pyramid {
         single: pyramid.single,
         nested: pyramid.packing == Packing::Nested,
         ghosts: pyramid.ghosts,
+        tiers: pyramid.tiers,
     }
 }
 
@@ -48,7 +50,7 @@ fn random_pyramid(random: &mut Random) -> wavesplat_format::Pyramid {
     let order = random_order(random);
     let packing = [Packing::Flat, Packing::Nested][random.below(2)];
     let ghosts = packing == Packing::Nested && random.below(2) == 0;
-    wavesplat_format::Pyramid { order, stencil, growth, most, single: random.below(2) == 0, packing, ghosts }
+    wavesplat_format::Pyramid { order, stencil, growth, most, single: random.below(2) == 0, packing, ghosts, tiers: 0 }
 }
 
 /// Random codes: mostly small or zero, sometimes of any magnitude.
@@ -79,7 +81,7 @@ fn pyramids_decode_to_the_specified_bits() {
         });
         let step = [1.0, 0.37, 1e-44, 1e20 * random.unit(), random.unit()][random.below(5)];
         let spelled = spelled_out(&pyramid);
-        let count = spelled.passes(extents).into_iter().map(|pass| spelled.added(pass, extents).count()).sum();
+        let count = spelled.passes(extents, 0).into_iter().map(|pass| spelled.added(pass, extents, 0).count()).sum();
         let codes = random_codes(count, &mut random);
         let expected = spelled_out(&pyramid).decode(extents, step, &codes);
         let what = format!("case {case}: {pyramid:?}, {extents:?}, step {step:e}");
@@ -156,26 +158,69 @@ fn transforms_along_time_give_the_specified_bits() {
     }
 }
 
-/// The coefficients of a block in 64-bit floats, if it has any.
-fn coefficients(window: &Window, codes: &[i32], block: &Block) -> Vec<f64> {
-    let [x, y, z] = block.size;
-    let extents = [x, y, z, window.coefficients as usize];
-    match &window.pyramid {
-        None => codes.iter().map(|q| f64::from(*q) * block.step).collect(),
-        Some(pyramid) => spelled_out(pyramid).decode(extents, block.step, codes),
+/// Blocks of tiers above 0, decoded: nodes in the order of their numbers.
+type Coarse = HashMap<BlockId, Vec<f64>>;
+
+/// A block of a file as the reference sees it.
+struct Seen<'a> {
+    metadata: &'a Metadata,
+    window: &'a Window,
+    id: BlockId,
+    block: &'a Block,
+    /// Its codes, pass after pass; empty if it has none.
+    codes: Vec<i32>,
+    coarse: &'a Coarse,
+}
+
+impl<'a> Seen<'a> {
+    fn new(metadata: &'a Metadata, codec: &WindowCodec, id: BlockId, block: &'a Block, coarse: &'a Coarse) -> Self {
+        let (window, codes) = (&metadata.windows[id.window as usize], block.all_codes(codec));
+        Self { metadata, window, id, block, codes, coarse }
+    }
+
+    /// The first voxel and the extents of its box.
+    fn boxed(&self, id: BlockId) -> ([usize; 3], [usize; 4]) {
+        let (first, [x, y, z]) = self.metadata.block_box(id.tier, id.block).unwrap();
+        (first.map(|n| n as usize), [x as usize, y as usize, z as usize, self.window.coefficients as usize])
+    }
+
+    fn is_coded(&self) -> bool {
+        !self.codes.is_empty() || self.window.tiers() > self.id.tier
+    }
+
+    /// The coefficients that some of its codes give.
+    fn coefficients(&self, codes: &[i32]) -> Vec<f64> {
+        let Some(pyramid) = self.window.pyramid.as_ref().map(spelled_out) else {
+            return codes.iter().map(|q| f64::from(*q) * self.block.step).collect();
+        };
+        let (tier, (start, extents)) = (self.id.tier, self.boxed(self.id));
+        let all: Vec<_> = pyramid.passes(extents, tier);
+        let count = all.iter().map(|pass| pyramid.added(*pass, extents, tier).count()).sum();
+        let zeros = vec![0; count];
+        let codes = if codes.is_empty() { &zeros } else { codes };
+        if tier == self.window.tiers() {
+            return pyramid.decode_tier(extents, tier, self.block.step, codes, &|_| f64::NAN);
+        }
+        let id = self.metadata.above(self.id);
+        let (above, (first, outer)) = (&self.coarse[&id], self.boxed(id));
+        let places: HashMap<[usize; 4], f64> = pyramid.nodes_of(outer, id.tier).zip(above.iter().copied()).collect();
+        let known = |[x, y, z, k]: [usize; 4]| {
+            places[&[x + start[0] - first[0], y + start[1] - first[1], z + start[2] - first[2], k]]
+        };
+        pyramid.decode_tier(extents, tier, self.block.step, codes, &known)
     }
 }
 
 /// The samples of a block.
-fn samples(codec: &WindowCodec, window: &Window, block: &Block, ty: SampleType) -> Vec<u8> {
+fn samples(seen: &Seen<'_>, ty: SampleType) -> Vec<u8> {
+    let Seen { window, block, codes, .. } = seen;
     if let Some(exact) = &block.exact {
         return exact.clone();
     }
     let (voxels, frames) = (block.voxels, window.frames as usize);
     let mut numbers = vec![0.0; voxels * frames];
-    let codes = block.all_codes(codec);
-    if !codes.is_empty() {
-        let (functions, all) = (learned_functions(&window.functions, frames), coefficients(window, &codes, block));
+    if seen.is_coded() {
+        let (functions, all) = (learned_functions(&window.functions, frames), seen.coefficients(codes));
         for voxel in 0..voxels {
             let of_voxel: Vec<f64> = all.iter().skip(voxel).step_by(voxels).copied().collect();
             let series = series(window.basis, &functions, &of_voxel, frames);
@@ -199,6 +244,7 @@ fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&WindowCodec, u3
         let codec = file.codec(window).unwrap();
         let all = vec![true; codec.basis.coefficients()];
         for entry in file.leaves(window).iter().flat_map(|leaf| file.leaf(leaf).unwrap()) {
+            let codec = codec.at(entry.id.tier, 0);
             visit(&codec, window, &entry, &file.block(&codec, &entry, &all).unwrap());
         }
     }
@@ -206,23 +252,20 @@ fn for_each_block(file: &CoefficientFile, mut visit: impl FnMut(&WindowCodec, u3
 
 /// Checks what the level parts of a block state: their number of codes, and the change when they and all finer ones
 /// are omitted.
-fn check_parts(codec: &WindowCodec, window: &Window, entry: &BlockEntry, block: &Block) {
-    let Some(pyramid) = window.pyramid.as_ref().map(spelled_out) else { return };
-    let codes = block.all_codes(codec);
+fn check_parts(seen: &Seen<'_>, entry: &BlockEntry) {
+    let Some(pyramid) = seen.window.pyramid.as_ref().map(spelled_out) else { return };
+    let (codes, tier) = (&seen.codes, seen.id.tier);
     if codes.is_empty() {
         return;
     }
-    let extents = [block.size[0], block.size[1], block.size[2], window.coefficients as usize];
-    let parts: Vec<usize> = pyramid
-        .passes(extents)
-        .into_iter()
-        .flat_map(|pass| pyramid.added(pass, extents).map(|node| pyramid.part(pass, node)).collect::<Vec<_>>())
-        .collect();
-    let whole = pyramid.decode(extents, block.step, &codes);
+    let (_, extents) = seen.boxed(seen.id);
+    let part = |pass| pyramid.added(pass, extents, tier).map(|node| pyramid.part(pass, node, tier)).collect::<Vec<_>>();
+    let parts: Vec<usize> = pyramid.passes(extents, tier).into_iter().flat_map(part).collect();
+    let whole = seen.coefficients(codes);
     for level in 0..4 {
         let count = codes.iter().zip(&parts).filter(|(code, part)| **code != 0 && **part == level).count();
         let coarser = codes.iter().zip(&parts).map(|(code, part)| if *part < level { *code } else { 0 });
-        let rest = pyramid.decode(extents, block.step, &coarser.collect::<Vec<_>>());
+        let rest = seen.coefficients(&coarser.collect::<Vec<_>>());
         let largest = whole.iter().zip(rest).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let said = entry.part(PartKind::Level(level as u8)).map(|part| (part.stats.count, part.stats.largest));
         let expected = (count > 0).then(|| (count as u64, largest.next_up()));
@@ -236,12 +279,19 @@ fn check_file(stored: &Stored) -> usize {
     let ty = file.sample();
     let mut expected = vec![0; file.frames() * file.grid.whole().voxels() * ty.size()];
     let [nx, ny, _] = file.grid.dims;
-    for_each_block(&file, |codec, number, entry, block| {
-        let window = &file.metadata().windows[number as usize];
-        check_parts(codec, window, entry, block);
-        coded += usize::from(!block.all_codes(codec).is_empty());
+    let mut coarse = Coarse::new();
+    for_each_block(&file, |codec, _, entry, block| {
+        let seen = Seen::new(file.metadata(), codec, entry.id, block, &coarse);
+        check_parts(&seen, entry);
+        coded += usize::from(!seen.codes.is_empty());
+        if entry.id.tier > 0 {
+            let nodes = seen.coefficients(&seen.codes);
+            coarse.insert(entry.id, nodes);
+            return;
+        }
+        let window = seen.window;
         let start = file.blocks.region(entry.id.block as usize).start;
-        for (i, sample) in samples(codec, window, block, ty).chunks(ty.size()).enumerate() {
+        for (i, sample) in samples(&seen, ty).chunks(ty.size()).enumerate() {
             let (voxel, frame) = (i % block.voxels, i / block.voxels + window.first_frame as usize);
             let [x, y, _] = block.size;
             let place = [start[0] + voxel % x, start[1] + voxel / x % y, start[2] + voxel / x / y];
@@ -320,14 +370,14 @@ fn every_node_is_within_half_a_step_of_its_level() {
                 let (codec, pyramid) = (file.codec(number_of_window).unwrap(), spelled_out(record));
                 let extents = [block.size[0], block.size[1], block.size[2], window.frames as usize];
                 let (start, field) = (file.blocks.region(entry.id.block as usize).start, block.field(&codec));
-                if block.exact.is_some() {
+                if block.exact.is_some() || entry.id.tier > 0 {
                     return;
                 }
-                for pass in pyramid.passes(extents) {
+                for pass in pyramid.passes(extents, 0) {
                     let step = pyramid.step(block.step, pass.level);
                     coarse += usize::from(step < block.step);
                     assert!(step <= 2.0 * window.delta);
-                    for node in pyramid.added(pass, extents).filter(|node| (0..3).all(|a| node[a] < extents[a])) {
+                    for node in pyramid.added(pass, extents, 0).filter(|node| (0..3).all(|a| node[a] < extents[a])) {
                         let i = number(extents, node);
                         let [x, y, z, t] = [0, 1, 2, 3].map(|a| node[a] + if a < 3 { start[a] } else { 0 });
                         let frame = t + window.first_frame as usize;

@@ -55,7 +55,7 @@ fn kept(values: &[f64], config: &ConvertConfig) -> (Vec<usize>, f64, Matrix) {
     assert!(block.exact.is_none() && block.outliers.positions.is_empty(), "the case says nothing about coefficients");
     let codes = block.all_codes(&codec);
     let of_voxel = |v| codes.iter().skip(v).step_by(VOXELS).filter(|c| **c != 0).count();
-    ((0..VOXELS).map(of_voxel).collect(), codec.bound.delta, codec.synthesis)
+    ((0..VOXELS).map(of_voxel).collect(), codec.bound.delta, codec.synthesis.to_vec())
 }
 
 /// Mean numbers of coefficients: the library's, and the fewest for the bound. A basis without analysis and synthesis

@@ -1,12 +1,13 @@
 //! Blocks and their parts before they are written, and the compressor that makes a part.
 
 use crate::limits::MAX_PART_RAW;
+use crate::section::decompress;
 use crate::{Error, Result};
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
 use std::fmt;
 
-/// Identifies a block: one box of voxels in one window and one channel. The order is that of the file: by window, then
-/// channel, then block.
+/// Identifies a block: one box of voxels in one window and one channel, and one of the lattices on which it is coded. The order
+/// is that of the file: by window, then tier from the coarsest on, then channel, then block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct BlockId {
     /// Number of the window, from 0.
@@ -15,11 +16,31 @@ pub struct BlockId {
     pub block: u32,
     /// Number of the channel, from 0.
     pub channel: u16,
+    /// The lattice of its nodes: all voxels (0), or those at multiples of 2^tier along x, y and z, in a box that is 2^tier times as
+    /// wide.
+    pub tier: u8,
+}
+
+impl BlockId {
+    /// A block of the finest tier.
+    pub fn new(window: u32, channel: u16, block: u32) -> Self {
+        Self { window, block, channel, tier: 0 }
+    }
+
+    /// Channel and tier as stored in a file.
+    pub(crate) fn place(self) -> [u8; 2] {
+        [self.channel as u8, self.tier]
+    }
+
+    /// The block with this number at a stored place.
+    pub(crate) fn at_place(window: u32, block: u32, [channel, tier]: [u8; 2]) -> Self {
+        Self { window, block, channel: channel.into(), tier }
+    }
 }
 
 impl Ord for BlockId {
     fn cmp(&self, other: &Self) -> Ordering {
-        let key = |id: &Self| (id.window, id.channel, id.block);
+        let key = |id: &Self| (id.window, Reverse(id.tier), id.channel, id.block);
         key(self).cmp(&key(other))
     }
 }
@@ -32,7 +53,8 @@ impl PartialOrd for BlockId {
 
 impl fmt::Display for BlockId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "window {} block {} channel {}", self.window, self.block, self.channel)
+        write!(f, "window {} block {} channel {}", self.window, self.block, self.channel)?;
+        if self.tier > 0 { write!(f, " tier {}", self.tier) } else { Ok(()) }
     }
 }
 
@@ -106,6 +128,16 @@ pub struct EncodedPart {
     pub raw_len: u32,
     /// One zstd frame.
     pub stored: Vec<u8>,
+}
+
+impl EncodedPart {
+    /// The payload, before compression.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if it cannot be decompressed.
+    pub fn payload(&self) -> Result<Vec<u8>> {
+        decompress(&self.stored, self.raw_len).map_err(Error::Invalid)
+    }
 }
 
 /// Statistics of a block, for skipping and reports, in the units of the samples.
@@ -190,8 +222,9 @@ mod tests {
 
     #[test]
     fn files_order_by_window_then_channel_then_block() {
-        let id = |window, channel, block| BlockId { window, block, channel };
+        let id = BlockId::new;
         assert!(id(0, 0, 9) < id(0, 1, 0) && id(0, 9, 9) < id(1, 0, 0));
+        assert!(BlockId { tier: 1, ..id(3, 5, 7) } < id(3, 0, 0) && id(2, 0, 0) < BlockId { tier: 1, ..id(3, 5, 7) });
         assert_eq!(id(3, 0, 7).to_string(), "window 3 block 7 channel 0");
     }
 }

@@ -74,7 +74,7 @@ impl BlockEntry {
     pub(crate) fn encode(&self, out: &mut Vec<u8>) {
         out.put_u32(self.id.window);
         out.put_u32(self.id.block);
-        out.put_u16(self.id.channel);
+        out.put(&self.id.place());
         out.put_u16(self.parts.len() as u16);
         out.put_u32(self.lost.into());
         let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
@@ -90,7 +90,7 @@ impl BlockEntry {
     }
 
     pub(crate) fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
-        let id = BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? };
+        let id = BlockId::at_place(fields.u32()?, fields.u32()?, fields.array()?);
         let count = usize::from(fields.u16()?);
         let lost = fields.u32()?;
         ensure(lost <= 1, || format!("the field lost is {lost} instead of 0 or 1"))?;

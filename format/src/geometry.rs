@@ -14,6 +14,8 @@ use crate::window::Window;
 pub struct BlockGeometry<'a> {
     /// Voxels of its box along x, y, z, clipped at the volume's far faces.
     pub size: [usize; 3],
+    /// Its tier.
+    pub tier: u8,
     /// Its window.
     pub window: &'a Window,
     /// Bytes of one sample.
@@ -42,7 +44,7 @@ impl BlockGeometry<'_> {
     /// The boxes of codes in a level part, each contiguous; empty without a pyramid.
     pub(crate) fn boxes(&self, level: u8) -> Vec<CodeBox> {
         let Some(pyramid) = &self.window.pyramid else { return Vec::new() };
-        let passes = pyramid.passes(self.size, self.window.coefficients as usize);
+        let passes = pyramid.passes(self.size, self.window.coefficients as usize, self.tier);
         let contiguous = |of: &PassBox| {
             let extents = of.extents(passes[of.pass].extent());
             CodeBox { allowed: of.allowed, ..CodeBox::contiguous(extents) }
@@ -85,6 +87,8 @@ impl BlockGeometry<'_> {
         if let PartKind::Level(level) = kind {
             ensure(self.codes(level).is_some(), || format!("{kind} of {} levels", self.window.parts()))?;
         }
+        let has_samples = self.tier == 0 || matches!(kind, PartKind::Level(_));
+        ensure(has_samples, || format!("{kind} in tier {}", self.tier))?;
         let most = self.max_count(kind);
         let least = if kind == PartKind::Exact { most } else { 1 };
         ensure((least..=most).contains(&count), || {

@@ -18,6 +18,9 @@ pub(crate) const VERSION: (u16, u16) = (1, 0);
 /// The version of files with any feature.
 const FEATURES_VERSION: (u16, u16) = (1, 1);
 
+/// The version of files with tiers.
+const TIERED_VERSION: (u16, u16) = (1, 2);
+
 /// The required features that this reader supports, by bit, as messages for readers that do not.
 const REQUIRED: [&str; 2] = [
     "nested parts (version 1.1 of the format): wavesplat 0.2 or later",
@@ -30,6 +33,9 @@ const NESTED: u64 = 1;
 /// The bit of a description.
 const DESCRIBED: u64 = 2;
 
+/// The bit of tiers. Programs do not read files with tiers yet, so it is not among [`REQUIRED`].
+const TIERED: u64 = 4;
+
 /// The required features of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Features {
@@ -37,19 +43,22 @@ pub struct Features {
     pub packing: Packing,
     /// Whether the file has a description.
     pub described: bool,
+    /// Whether windows may have tiers.
+    pub tiered: bool,
 }
 
 impl Features {
     /// The field `required` of the header.
     pub(crate) fn bits(self) -> u64 {
         let nested = if self.packing == Packing::Nested { NESTED } else { 0 };
-        nested | if self.described { DESCRIBED } else { 0 }
+        let bit = |has: bool, bit: u64| if has { bit } else { 0 };
+        nested | bit(self.described, DESCRIBED) | bit(self.tiered, TIERED)
     }
 }
 
 impl From<Packing> for Features {
     fn from(packing: Packing) -> Self {
-        Self { packing, described: false }
+        Self { packing, described: false, tiered: false }
     }
 }
 
@@ -71,15 +80,19 @@ impl Header {
     /// The header of a new file with these features.
     pub(crate) fn new(id: FileId, features: Features) -> Self {
         let required = features.bits();
-        let version = if required == 0 { VERSION } else { FEATURES_VERSION };
-        let needs = (0..REQUIRED.len()).find(|bit| required >> bit & 1 == 1).map_or("", |bit| REQUIRED[bit]);
+        let version = match required {
+            0 => VERSION,
+            1..TIERED => FEATURES_VERSION,
+            TIERED.. => TIERED_VERSION,
+        };
+        let needs = (0..REQUIRED.len()).rfind(|bit| required >> bit & 1 == 1).map_or("", |bit| REQUIRED[bit]);
         Self { version, required, optional: 0, id, needs: needs.into() }
     }
 
     /// The features that it announces.
     pub(crate) fn features(&self) -> Features {
         let packing = if self.required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
-        Features { packing, described: self.required & DESCRIBED != 0 }
+        Features { packing, described: self.required & DESCRIBED != 0, tiered: self.required & TIERED != 0 }
     }
 
     pub(crate) fn encode(&self) -> Vec<u8> {

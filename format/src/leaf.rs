@@ -23,6 +23,8 @@ pub struct LeafEntry {
     pub first_block: u32,
     /// Channel of its blocks.
     pub channel: u16,
+    /// Tier of its blocks.
+    pub tier: u8,
     /// Number of its blocks, 1 to 512.
     pub count: u16,
     /// Bytes of the compressed leaf after its frame.
@@ -62,14 +64,14 @@ pub struct LeafEntry {
 impl LeafEntry {
     /// An empty leaf whose first block will be `id` at `data_offset`.
     pub(crate) fn new(id: BlockId, data_offset: u64) -> Self {
-        let BlockId { window, block: first_block, channel } = id;
+        let BlockId { window, block: first_block, channel, tier } = id;
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         let (count, stored_len, raw_len, offset, checksum) = (0, 0, 0, 0, 0);
         let (reached, squared_error, energy, dropped) = (0.0, 0.0, 0.0, 0.0);
         let (coded, outliers, missing, exact, lost) = (0, 0, 0, 0, 0);
         #[rustfmt::skip]
         let leaf = Self {
-            window, first_block, channel, count, stored_len, raw_len, data_offset, offset, checksum,
+            window, first_block, channel, tier, count, stored_len, raw_len, data_offset, offset, checksum,
             min, max, reached, squared_error, energy, dropped, coded, outliers, missing, exact, lost,
         };
         leaf
@@ -77,7 +79,7 @@ impl LeafEntry {
 
     /// Its first block.
     pub fn first(&self) -> BlockId {
-        BlockId { window: self.window, block: self.first_block, channel: self.channel }
+        BlockId { window: self.window, block: self.first_block, channel: self.channel, tier: self.tier }
     }
 
     /// Adds a block's statistics. Sums run in the order of the blocks, so that writer and reader get the same bits.
@@ -144,7 +146,7 @@ impl LeafEntry {
     pub(crate) fn encode(&self, out: &mut Vec<u8>) {
         out.put_u32(self.window);
         out.put_u32(self.first_block);
-        out.put_u16(self.channel);
+        out.put(&self.first().place());
         out.put_u16(self.count);
         out.put_u32(self.stored_len);
         out.put_u32(self.raw_len);
@@ -165,10 +167,13 @@ impl LeafEntry {
     }
 
     pub(crate) fn decode(fields: &mut FieldReader<'_>) -> ParseResult<Self> {
+        let BlockId { window, block: first_block, channel, tier } =
+            BlockId::at_place(fields.u32()?, fields.u32()?, fields.array()?);
         Ok(Self {
-            window: fields.u32()?,
-            first_block: fields.u32()?,
-            channel: fields.u16()?,
+            window,
+            first_block,
+            channel,
+            tier,
             count: fields.u16()?,
             stored_len: fields.u32()?,
             raw_len: fields.u32()?,
@@ -209,32 +214,36 @@ fn lesser(a: f64, b: f64) -> f64 {
     if b.total_cmp(&a).is_lt() { b } else { a }
 }
 
-/// The first block and the number of blocks of each leaf of a window, in order.
-pub(crate) fn leaves_of(metadata: &Metadata, window: u32) -> impl Iterator<Item = (BlockId, u32)> {
-    let blocks = metadata.blocks_per_channel();
-    let runs = move || (0..blocks).step_by(BLOCKS_PER_LEAF as usize);
-    (0..metadata.channels)
-        .flat_map(move |channel| runs().map(move |block| BlockId { window, block, channel }))
-        .map(move |id| (id, BLOCKS_PER_LEAF.min(blocks - id.block)))
+/// The first block and the number of blocks of each leaf of a window with these tiers, in order.
+pub(crate) fn leaves_of(metadata: &Metadata, window: u32, tiers: u8) -> impl Iterator<Item = (BlockId, u32)> {
+    (0..=tiers).rev().flat_map(move |tier| {
+        let blocks = metadata.blocks_per_channel(tier);
+        let runs = move || (0..blocks).step_by(BLOCKS_PER_LEAF as usize);
+        (0..metadata.channels)
+            .flat_map(move |channel| runs().map(move |block| BlockId { window, block, channel, tier }))
+            .map(move |id| (id, BLOCKS_PER_LEAF.min(blocks - id.block)))
+    })
 }
 
 /// Checks that these are all leaves of the archive, window after window from the end of the start section. Returns the
 /// end of the last window.
 pub(crate) fn check_leaves(metadata: &Metadata, leaves: &[LeafEntry]) -> ParseResult<u64> {
-    let per_window = metadata.leaves_per_window() as usize;
-    let count = per_window as u64 * metadata.windows.len() as u64;
+    let windows = 0..metadata.windows.len() as u32;
+    let count = windows.clone().fold(0u64, |sum, window| sum.saturating_add(metadata.leaves_of_window(window)));
     ensure(leaves.len() as u64 == count, || format!("{} leaves instead of {count}", leaves.len()))?;
-    let windows = (0..).zip(leaves.chunks(per_window.max(1)));
-    windows
-        .take(metadata.windows.len())
-        .try_fold(metadata.start_end()?, |end, (number, leaves)| check_window(metadata, number, leaves, end))
+    let (mut rest, mut end) = (leaves, metadata.start_end()?);
+    for number in windows {
+        let (own, after) = rest.split_at(metadata.leaves_of_window(number) as usize);
+        (rest, end) = (after, check_window(metadata, number, own, end)?);
+    }
+    Ok(end)
 }
 
 /// Checks that these are all leaves of a window that starts after the byte `end`; returns the window's end.
 pub(crate) fn check_window(metadata: &Metadata, number: u32, leaves: &[LeafEntry], mut end: u64) -> ParseResult<u64> {
     let window = metadata.windows.get(number as usize).ok_or("no such window")?;
     end = section_end(align(end), metadata.window_record(number).encode()?.len());
-    for ((id, count), leaf) in leaves_of(metadata, number).zip(leaves) {
+    for ((id, count), leaf) in leaves_of(metadata, number, window.tiers()).zip(leaves) {
         let same = leaf.first() == id && u32::from(leaf.count) == count;
         ensure(same, || format!("leaf of {count} blocks from {id} expected, not from {}", leaf.first()))?;
         end = leaf.check(end)?;

@@ -42,6 +42,12 @@ pub const MAX_DESCRIPTION_ITEMS: usize = 1 << 16;
 /// Bytes of the root of the directory before compression: 8 million leaves.
 pub const MAX_ROOT_RAW: u64 = 1 << 30;
 
+/// Channels of an archive.
+pub const MAX_CHANNELS: u16 = 256;
+
+/// Tiers above the blocks of a window.
+pub const MAX_TIERS: u8 = 24;
+
 /// Rounds up to a multiple of [`ALIGN`], or to `u64::MAX` on overflow.
 pub(crate) fn align(position: u64) -> u64 {
     position.checked_next_multiple_of(ALIGN).unwrap_or(u64::MAX)

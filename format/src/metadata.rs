@@ -141,10 +141,11 @@ impl Metadata {
         start
     }
 
-    /// [`Packing::Nested`] if any window has it.
-    pub fn packing(&self) -> Packing {
+    /// The features that its windows have.
+    pub fn features(&self) -> Features {
         let nested = self.windows.iter().any(|window| window.packing() == Packing::Nested);
-        if nested { Packing::Nested } else { Packing::Flat }
+        let packing = if nested { Packing::Nested } else { Packing::Flat };
+        Features { packing, described: false, tiered: self.windows.iter().any(|window| window.tiers() > 0) }
     }
 
     /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the
@@ -233,7 +234,8 @@ impl Metadata {
         ensure(sized, || format!("dimensions {:?}: each must be 1 to {MAX_DIM}", self.dims))?;
         let spaced = self.spacing.iter().all(|s| s.is_finite() && *s > 0.0);
         ensure(spaced && self.origin.iter().all(|o| o.is_finite()), || "spacing or origin out of range".into())?;
-        ensure(self.channels > 0 && self.block_edge > 0, || "no channels, or a block edge of 0".into())?;
+        ensure((1..=MAX_CHANNELS).contains(&self.channels), || format!("{} channels", self.channels))?;
+        ensure(self.block_edge > 0, || "a block edge of 0".into())?;
         let blocks = self.count_blocks().and_then(|n| u32::try_from(n).ok());
         ensure(blocks.is_some(), || "too many blocks in a window".into())
     }
@@ -261,6 +263,8 @@ impl Metadata {
             place(format!("starts at frame {} instead of {next}", window.first_frame))
         })?;
         let voxels_in_all = self.dims.iter().fold(u64::from(self.channels), |n, d| n.saturating_mul(*d));
+        let tiers = window.tiers() == 0 || self.block_edge.is_multiple_of(2);
+        ensure(tiers, || place(format!("tiers of blocks of {} voxels a side", self.block_edge)))?;
         window.check(self.largest_box(), voxels_in_all).map_err(place)
     }
 
@@ -270,42 +274,65 @@ impl Metadata {
         self.dims.iter().fold(1, |voxels: u64, &dim| voxels.saturating_mul(dim.min(edge)))
     }
 
-    /// Number of boxes along x, y, z.
-    pub fn blocks_per_axis(&self) -> [u64; 3] {
-        self.dims.map(|dim| dim.div_ceil(u64::from(self.block_edge).max(1)))
+    /// Number of boxes of a tier along x, y, z.
+    pub fn blocks_per_axis(&self, tier: u8) -> [u64; 3] {
+        self.dims.map(|dim| dim.div_ceil(self.edge(tier).max(1)))
+    }
+
+    /// Voxels along each edge of the boxes of a tier.
+    fn edge(&self, tier: u8) -> u64 {
+        u64::from(self.block_edge) << tier.min(MAX_TIERS)
     }
 
     fn count_blocks(&self) -> Option<u64> {
-        self.blocks_per_axis().iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks))
+        self.blocks_per_axis(0).iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks))
     }
 
-    /// Number of blocks in one window and channel; meaningful for valid metadata.
-    pub fn blocks_per_channel(&self) -> u32 {
-        self.count_blocks().and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX)
+    /// Number of blocks of a tier in one window and channel; meaningful for valid metadata.
+    pub fn blocks_per_channel(&self, tier: u8) -> u32 {
+        let count = self.blocks_per_axis(tier).iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks));
+        count.and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX)
+    }
+
+    /// Number of tiers above the blocks of a window.
+    pub fn tiers(&self, window: u32) -> u8 {
+        self.windows.get(window as usize).map_or(0, Window::tiers)
     }
 
     /// Number of blocks in the whole archive, or `u64::MAX` on overflow.
     pub fn blocks(&self) -> u64 {
-        self.blocks_per_window().saturating_mul(self.windows.len() as u64)
+        let windows = 0..self.windows.len() as u32;
+        windows.fold(0, |sum: u64, window| sum.saturating_add(self.blocks_of_window(window)))
     }
 
-    /// Number of blocks in a window, of all channels.
-    pub fn blocks_per_window(&self) -> u64 {
-        u64::from(self.blocks_per_channel()) * u64::from(self.channels)
+    /// Number of blocks in a window, of all tiers and channels.
+    pub fn blocks_of_window(&self, window: u32) -> u64 {
+        let tiers = 0..=self.tiers(window);
+        tiers.map(|tier| u64::from(self.blocks_per_channel(tier))).sum::<u64>() * u64::from(self.channels)
     }
 
-    /// Number of leaves that describe one window.
-    pub(crate) fn leaves_per_window(&self) -> u64 {
-        u64::from(self.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF)) * u64::from(self.channels)
+    /// The block of the next tier whose box has that of a block.
+    pub fn above(&self, id: BlockId) -> BlockId {
+        let tier = id.tier.saturating_add(1);
+        let ([nx, ny, _], [of_x, of_y, _]) = (self.blocks_per_axis(id.tier), self.blocks_per_axis(tier));
+        let block = u64::from(id.block);
+        let [x, y, z] = [block % nx / 2, block / nx % ny / 2, block / nx / ny / 2];
+        BlockId { block: (x + of_x * (y + of_y * z)) as u32, tier, ..id }
     }
 
-    /// First voxel and size of a block's box along x, y, z; `None` if the grid has no such block.
-    pub fn block_box(&self, block: u32) -> Option<([u64; 3], [u64; 3])> {
-        if block >= self.blocks_per_channel() {
+    /// Number of leaves that describe a window.
+    pub(crate) fn leaves_of_window(&self, window: u32) -> u64 {
+        let leaves = |tier| u64::from(self.blocks_per_channel(tier).div_ceil(BLOCKS_PER_LEAF));
+        (0..=self.tiers(window)).map(leaves).sum::<u64>() * u64::from(self.channels)
+    }
+
+    /// First voxel and size of the box of a tier's block along x, y, z; `None` if the grid has no such block.
+    pub fn block_box(&self, tier: u8, block: u32) -> Option<([u64; 3], [u64; 3])> {
+        if block >= self.blocks_per_channel(tier) {
             return None;
         }
-        let [nx, ny, _] = self.blocks_per_axis();
-        let (block, edge) = (u64::from(block), u64::from(self.block_edge));
+        let [nx, ny, _] = self.blocks_per_axis(tier);
+        let (block, edge) = (u64::from(block), self.edge(tier));
         let first = [block % nx * edge, block / nx % ny * edge, block / nx / ny * edge];
         let size = std::array::from_fn(|axis| edge.min(self.dims[axis] - first[axis]));
         Some((first, size))
@@ -314,9 +341,11 @@ impl Metadata {
     /// The sizes of a block; `None` if the archive has no such block.
     pub fn geometry(&self, id: BlockId) -> Option<BlockGeometry<'_>> {
         let window = self.windows.get(id.window as usize).filter(|_| id.channel < self.channels)?;
-        let (_, size) = self.block_box(id.block)?;
-        usize::try_from(size.iter().product::<u64>()).ok()?;
-        Some(BlockGeometry { size: size.map(|n| n as usize), window, sample_size: self.sample.size() })
+        let (_, size) = self.block_box(id.tier, id.block).filter(|_| id.tier <= window.tiers())?;
+        let nodes = size.map(|n| n.div_ceil(1 << id.tier));
+        usize::try_from(nodes.iter().product::<u64>()).ok()?;
+        let (size, sample_size) = (size.map(|n| n as usize), self.sample.size());
+        Some(BlockGeometry { size, window, sample_size, tier: id.tier })
     }
 }
 
@@ -382,9 +411,9 @@ mod tests {
     #[test]
     fn boxes_tile_the_grid() {
         let metadata = metadata();
-        let boxes = (0..metadata.blocks_per_channel()).filter_map(|block| metadata.block_box(block));
+        let boxes = (0..metadata.blocks_per_channel(0)).filter_map(|block| metadata.block_box(0, block));
         let voxels: u64 = boxes.map(|(_, size)| size.iter().product::<u64>()).sum();
         assert_eq!(voxels, metadata.dims.iter().product::<u64>());
-        assert_eq!(metadata.block_box(metadata.blocks_per_channel()), None);
+        assert_eq!(metadata.block_box(0, metadata.blocks_per_channel(0)), None);
     }
 }

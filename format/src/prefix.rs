@@ -85,14 +85,17 @@ impl CompletePrefix {
         let at = scan.pad(storage)?;
         let (begin, record) = plain_at(storage, self.id, SectionId::Window(number), at, MAX_METADATA)?;
         scan.at = begin.end();
-        for (first, count) in leaves_of(&self.metadata, number) {
+        let corrupt = |what: String| SectionId::Window(number).corrupt(at, what);
+        let record = WindowRecord::parse(&record)
+            .and_then(|record| record.window.check_announced(self.features).map(|()| record))
+            .map_err(corrupt)?;
+        for (first, count) in leaves_of(&self.metadata, number, record.window.tiers()) {
             scan.read_leaf(storage, self.id, first, count)?;
         }
         let (section, at) = (SectionId::WindowEnd(number), scan.pad(storage)?);
         let (extent, end) = plain_at(storage, self.id, section, at, WINDOW_END)?;
-        let checked = WindowRecord::parse(&record)
-            .and_then(|record| record.window.check_packing(self.features.packing).map(|()| record))
-            .and_then(|record| self.metadata.push(record, &WindowEnd::parse(&end)?))
+        let checked = WindowEnd::parse(&end)
+            .and_then(|end| self.metadata.push(record, &end))
             .and_then(|()| check_window(&self.metadata, number, &scan.leaves, self.end))
             .and_then(|end| ensure(end == extent.end(), || "not at the end of its window".into()));
         if let Err(what) = checked {

@@ -8,6 +8,7 @@
 
 use crate::bytes::{ParseResult, ensure};
 use crate::codes::sparse::CodeBox;
+use crate::limits::MAX_TIERS;
 use bincode::de::Decoder;
 use bincode::enc::Encoder;
 use bincode::error::{DecodeError, EncodeError};
@@ -71,7 +72,13 @@ pub struct Pyramid {
     /// Whether coarse lattices of blocks with an even number of voxels have ghost nodes, which make nodes between them
     /// interpolated instead of extrapolated. Only if packing is nested.
     pub ghosts: bool,
+    /// The number of tiers above the blocks: coarse lattices, each with every second node of the one below along x, y, z, that
+    /// are coded in blocks of their own. Each of these covers 2 x 2 x 2 blocks of the tier below. Only if packing is nested.
+    pub tiers: u8,
 }
+
+/// The lowest bit of the number of tiers in the flags.
+const TIERS: u32 = 3;
 
 /// The fields of a pyramid as they are stored.
 type Stored = (Vec<Axis>, Stencil, f64, f64, u8);
@@ -79,7 +86,7 @@ type Stored = (Vec<Axis>, Stencil, f64, f64, u8);
 impl Encode for Pyramid {
     fn encode<E: Encoder>(&self, encoder: &mut E) -> Result<(), EncodeError> {
         let nested = self.packing == Packing::Nested;
-        let flags = u8::from(self.single) | u8::from(nested) << 1 | u8::from(self.ghosts) << 2;
+        let flags = u8::from(self.single) | u8::from(nested) << 1 | u8::from(self.ghosts) << 2 | self.tiers << TIERS;
         let stored: Stored = (self.order.clone(), self.stencil, self.growth, self.most, flags);
         stored.encode(encoder)
     }
@@ -88,11 +95,12 @@ impl Encode for Pyramid {
 impl<C> Decode<C> for Pyramid {
     fn decode<D: Decoder<Context = C>>(decoder: &mut D) -> Result<Self, DecodeError> {
         let (order, stencil, growth, most, flags) = Stored::decode(decoder)?;
-        if flags > 7 || flags & 6 == 4 {
+        let tiers = flags >> TIERS;
+        if flags & 2 == 0 && (flags & 4 != 0 || tiers > 0) || tiers > MAX_TIERS {
             return Err(DecodeError::OtherString(format!("a pyramid with the flags {flags}")));
         }
         let packing = if flags & 2 == 0 { Packing::Flat } else { Packing::Nested };
-        Ok(Self { order, stencil, growth, most, single: flags & 1 == 1, packing, ghosts: flags & 4 != 0 })
+        Ok(Self { order, stencil, growth, most, single: flags & 1 == 1, packing, ghosts: flags & 4 != 0, tiers })
     }
 }
 
@@ -142,6 +150,8 @@ pub struct Pass {
     pub limits: [usize; 4],
     /// The level part of the block that holds its codes in version 1.0.
     pub part: u8,
+    /// Whether its nodes are those of the block above, so that it adds none.
+    pub is_known: bool,
 }
 
 impl Pass {
@@ -153,6 +163,9 @@ impl Pass {
 
     /// Number of nodes that it adds along x, y, z, k.
     pub fn extent(&self) -> [usize; 4] {
+        if self.is_known {
+            return [0; 4];
+        }
         std::array::from_fn(|axis| {
             let (first, distance) = self.nodes(axis);
             self.limits[axis].saturating_sub(first).div_ceil(distance)
@@ -170,6 +183,16 @@ impl Pass {
     }
 }
 
+impl Pass {
+    /// The pass on the lattice at multiples of `2^level` along x, y and z.
+    fn thinned(&self, level: u32) -> Self {
+        let (strides, limits) = (self.strides, self.limits);
+        let thin = |a: usize| if a < 3 { (strides[a] >> level).max(1) } else { strides[a] };
+        let end = |a: usize| if a < 3 { limits[a].div_ceil(1 << level) } else { limits[a] };
+        Self { strides: std::array::from_fn(thin), limits: std::array::from_fn(end), ..*self }
+    }
+}
+
 impl Pyramid {
     /// Number of level parts of a block: the coarse levels together, level 1, level 0, and a last pass of level 0 along time.
     pub const PARTS: u8 = 4;
@@ -182,18 +205,54 @@ impl Pyramid {
         [Axis::X, Axis::Y, Axis::Z].map(|axis| usize::from(ghost(axis)))
     }
 
-    /// The passes of a block of `size` voxels with `k` coefficients each, coarse to fine; the codes of a block come in this
-    /// order.
-    pub fn passes(&self, size: [usize; 3], k: usize) -> Vec<Pass> {
+    /// The nodes along x, y, z of a block of a tier that covers `size` voxels; above tier 0 with ghost nodes.
+    pub fn nodes(&self, size: [usize; 3], tier: u8) -> [usize; 3] {
+        let ghosts = if tier > 0 { self.ghost_nodes(size) } else { [0; 3] };
+        std::array::from_fn(|axis| (size[axis] + ghosts[axis]).div_ceil(1 << tier))
+    }
+
+    /// The passes of a block of a tier that covers `size` voxels with `k` coefficients each, coarse to fine; the codes of a block
+    /// come in this order. Positions are those on the tier's lattice.
+    ///
+    /// The last tier has all passes of coarser lattices as well. In others the first pass has the nodes of the block above.
+    pub fn passes(&self, size: [usize; 3], k: usize, tier: u8) -> Vec<Pass> {
+        let all = self.all_passes(size, k, tier > 0);
+        let (level, is_last) = (u32::from(tier), tier == self.tiers);
+        let along_time = |pass: &Pass| pass.axis == Some(Axis::T);
+        let adds = |pass: &&Pass| match (along_time(pass), is_last) {
+            (true, true) => true,
+            (true, false) => pass.level <= level && pass.strides[..3].iter().any(|stride| *stride <= 1 << level),
+            (false, true) => pass.level >= level,
+            (false, false) => pass.level == level && pass.axis.is_some(),
+        };
+        let own = all.iter().filter(adds).map(|pass| pass.thinned(level));
+        let known = (!is_last).then(|| self.known_pass(&all[0], level));
+        known.into_iter().chain(own).collect()
+    }
+
+    /// The nodes of the block above that a block of the tier `level` begins with.
+    fn known_pass(&self, first: &Pass, level: u32) -> Pass {
+        let [apart, frames] = match self.order.iter().position(|axis| *axis == Axis::T) {
+            None => [2 << level, 1],
+            Some(0) => [2 << level, 1 << level],
+            Some(_) => [2 << level; 2],
+        };
+        let strides = [apart, apart, apart, frames];
+        Pass { strides, level: level + 1, is_known: true, ..*first }.thinned(level)
+    }
+
+    /// The passes of a block with all its nodes. `has_ghosts` says whether ghost nodes remain on the finest lattice.
+    fn all_passes(&self, size: [usize; 3], k: usize, has_ghosts: bool) -> Vec<Pass> {
         let ([x, y, z], [gx, gy, gz]) = (size, self.ghost_nodes(size));
         let (inner, outer) = ([x, y, z, k], [x + gx, y + gy, z + gz, k]);
         let refined = || self.order.iter().map(|axis| axis.index());
         let levels = refined().map(|a| outer[a].next_power_of_two().trailing_zeros()).max().unwrap_or(0);
+        let levels = levels.max(self.tiers.into());
         let mut strides = [1; 4];
         refined().for_each(|a| strides[a] = 1 << levels);
         let lattice = |axis, level, strides: [usize; 4], part| {
-            let limits = std::array::from_fn(|a| if strides[a] > 1 { outer[a] } else { inner[a] });
-            Pass { axis, level, strides, limits, part }
+            let limits = std::array::from_fn(|a| if strides[a] > 1 || has_ghosts { outer[a] } else { inner[a] });
+            Pass { axis, level, strides, limits, part, is_known: false }
         };
         let mut passes = vec![lattice(None, levels, strides, 0)];
         for level in (0..levels).rev() {
@@ -211,11 +270,14 @@ impl Pyramid {
     ///
     /// If nested, passes along time are divided: what coarse pictures of all frames need is in the coarse parts. Part 0
     /// has nodes at multiples of 4 along the refined axes x, y and z, part 1 those at multiples of 2, and the others are
-    /// where the pass is in version 1.0.
+    /// where the pass is in version 1.0. With tiers, multiples are those on the lattice of the last tier, and blocks of the others
+    /// have only the nodes that no tier above has.
     pub fn boxes(&self, passes: &[Pass]) -> Vec<PassBox> {
         let whole = |pass, part| PassBox { pass, part, every: [1; 3], allowed: 0xFF };
+        let has_known = passes.first().is_some_and(|pass| pass.is_known);
         let of_pass = |(number, pass): (usize, &Pass)| match (self.packing, pass.axis) {
-            (Packing::Nested, Some(Axis::T)) => self.boxes_along_time(number, pass),
+            _ if pass.is_known => Vec::new(),
+            (Packing::Nested, Some(Axis::T)) => self.boxes_along_time(number, pass, has_known),
             _ => vec![whole(number, pass.part)],
         };
         let mut boxes: Vec<PassBox> = passes.iter().enumerate().flat_map(of_pass).collect();
@@ -223,14 +285,16 @@ impl Pyramid {
         boxes
     }
 
-    fn boxes_along_time(&self, number: usize, pass: &Pass) -> Vec<PassBox> {
+    fn boxes_along_time(&self, number: usize, pass: &Pass, has_known: bool) -> Vec<PassBox> {
         let refined = [Axis::X, Axis::Y, Axis::Z].map(|axis| self.order.contains(&axis));
         // Every n-th node along an axis lies at a multiple of 2^level.
         let every = |level: u32| -> [usize; 3] {
             std::array::from_fn(|a| if refined[a] { ((1 << level) / pass.strides[a]).max(1) } else { 1 })
         };
-        let mut boxes = vec![PassBox { pass: number, part: 0, every: every(2), allowed: 0xFF }];
-        for (level, part) in [(1, pass.part.min(1)), (0, pass.part)] {
+        let coarsest = PassBox { pass: number, part: 0, every: every(2), allowed: 0xFF };
+        let mut boxes = if has_known { Vec::new() } else { vec![coarsest] };
+        let finer = [(1, pass.part.min(1)), (0, pass.part)];
+        for (level, part) in finer.into_iter().skip(has_known.into()) {
             let (coarse, fine) = (every(level + 1), every(level));
             if coarse != fine {
                 let even = (0..3).filter(|a| coarse[*a] != fine[*a]).fold(0xFF, |bits, a| bits & EVEN[a]);
@@ -241,8 +305,8 @@ impl Pyramid {
     }
 
     fn part(&self, level: u32, axis: Axis) -> u8 {
-        match level {
-            0 if axis == Axis::T && self.order.last() == Some(&Axis::T) => 3,
+        match level.saturating_sub(self.tiers.into()) {
+            0 if level == 0 && axis == Axis::T && self.order.last() == Some(&Axis::T) => 3,
             0 => 2,
             1 => 1,
             _ => 0,
@@ -264,7 +328,12 @@ impl Pyramid {
         ensure(basis_is_samples || !seen[Axis::T.index()], || {
             "a pyramid along time with a transform along time".into()
         })?;
-        ensure(!self.ghosts || self.packing == Packing::Nested, || "ghost nodes without nested parts".into())?;
+        let nested = self.packing == Packing::Nested;
+        ensure(!self.ghosts && self.tiers == 0 || nested, || "ghost nodes or tiers without nested parts".into())?;
+        let in_space = [Axis::X, Axis::Y, Axis::Z].iter().all(|axis| seen[axis.index()]);
+        ensure(self.tiers == 0 || in_space && self.tiers <= MAX_TIERS, || {
+            format!("{} tiers of a pyramid that refines {:?}", self.tiers, self.order)
+        })?;
         let steps = |f: f64| f.is_finite() && (1.0..=1e6).contains(&f);
         ensure(steps(self.growth) && steps(self.most), || "a pyramid's steps out of range".into())
     }
@@ -283,6 +352,7 @@ mod tests {
             single: false,
             packing: Packing::Nested,
             ghosts: true,
+            tiers: 0,
         }
     }
 
@@ -297,7 +367,7 @@ mod tests {
                 let [gx, gy, gz] = pyramid.ghost_nodes([x, y, z]);
                 let outer = [x + gx, y + gy, z + gz, k];
                 let mut seen = vec![0; outer.iter().product()];
-                for pass in pyramid.passes([x, y, z], k) {
+                for pass in pyramid.passes([x, y, z], k, 0) {
                     let at = |axis: usize| {
                         let (first, distance) = pass.nodes(axis);
                         (first..pass.limits[axis]).step_by(distance)
@@ -324,7 +394,7 @@ mod tests {
     #[test]
     fn parts_come_in_the_order_of_passes() {
         for order in [[Axis::X, Axis::Y, Axis::Z, Axis::T], [Axis::T, Axis::Z, Axis::Y, Axis::X]] {
-            let parts: Vec<u8> = pyramid(&order).passes([33, 20, 64], 32).iter().map(|p| p.part).collect();
+            let parts: Vec<u8> = pyramid(&order).passes([33, 20, 64], 32, 0).iter().map(|p| p.part).collect();
             assert!(parts.is_sorted() && parts.iter().all(|p| *p < Pyramid::PARTS), "{parts:?}");
         }
     }

@@ -31,6 +31,8 @@ struct Index {
     footer: Footer,
     metadata: Metadata,
     leaves: Vec<LeafEntry>,
+    /// The number of the first leaf of each window, and of all leaves.
+    starts: Vec<usize>,
 }
 
 impl<S: Storage> Reader<S> {
@@ -44,11 +46,15 @@ impl<S: Storage> Reader<S> {
         storage.fetch(std::slice::from_ref(&(footer.metadata.offset..footer.total)))?;
         let metadata = read_metadata(&storage, &footer)?;
         let features = header.features();
-        let packed = metadata.windows.iter().try_for_each(|window| window.check_packing(features.packing));
-        packed.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
+        let announced = metadata.windows.iter().try_for_each(|window| window.check_announced(features));
+        announced.map_err(|what| SectionId::Metadata.corrupt(footer.metadata.offset, what))?;
         check_announced(&header, &footer)?;
         let leaves = read_root(&storage, &footer, &metadata)?;
-        Ok(Self { storage, index: Index { features, footer, metadata, leaves } })
+        let mut starts = vec![0];
+        for window in 0..metadata.windows.len() as u32 {
+            starts.push(starts[window as usize] + metadata.leaves_of_window(window) as usize);
+        }
+        Ok(Self { storage, index: Index { features, footer, metadata, leaves, starts } })
     }
 
     pub(crate) fn footer(&self) -> &Footer {
@@ -90,11 +96,20 @@ impl<S: Storage> Reader<S> {
         &self.storage
     }
 
-    /// The leaves of a window, ordered by channel and block; empty if the archive has no such window.
+    /// The leaves of a window, ordered by tier, channel and block; empty if the archive has no such window.
     pub fn leaves(&self, window: u32) -> &[LeafEntry] {
-        let count = self.index.metadata.leaves_per_window() as usize;
-        let start = count.saturating_mul(window as usize);
-        start.checked_add(count).and_then(|end| self.index.leaves.get(start..end)).unwrap_or(&[])
+        match self.index.starts.get(window as usize..).unwrap_or_default() {
+            [start, end, ..] => &self.index.leaves[*start..*end],
+            _ => &[],
+        }
+    }
+
+    /// The leaves of a window's tier and channel, ordered by block; empty if the archive has none.
+    pub fn leaves_of(&self, window: u32, tier: u8, channel: u16) -> &[LeafEntry] {
+        let leaves = self.leaves(window);
+        let start = leaves.partition_point(|leaf| leaf.first() < BlockId { window, block: 0, channel, tier });
+        let end = leaves.partition_point(|leaf| leaf.first() <= BlockId { window, block: u32::MAX, channel, tier });
+        &leaves[start..end]
     }
 
     /// Reads the entries of a leaf's blocks, in order.
@@ -139,9 +154,8 @@ impl<S: Storage> Reader<S> {
     /// [`Error::Invalid`] if the archive has no such block; otherwise as [`Self::leaf`].
     pub fn entry(&self, id: BlockId) -> Result<BlockEntry> {
         self.geometry(id)?;
-        let per_channel = self.index.metadata.blocks_per_channel().div_ceil(BLOCKS_PER_LEAF) as usize;
-        let number = per_channel * usize::from(id.channel) + (id.block / BLOCKS_PER_LEAF) as usize;
-        let found = self.leaves(id.window).get(number).map(|leaf| self.leaf(leaf)).transpose()?;
+        let leaves = self.leaves_of(id.window, id.tier, id.channel);
+        let found = leaves.get((id.block / BLOCKS_PER_LEAF) as usize).map(|leaf| self.leaf(leaf)).transpose()?;
         let entry = found.and_then(|entries| entries.into_iter().nth((id.block % BLOCKS_PER_LEAF) as usize));
         entry.ok_or_else(|| no_block(id))
     }

@@ -143,17 +143,20 @@ impl Recovery {
     /// # Errors
     /// [`Error::Io`] if the storage or writing fails.
     pub fn write<W: Write>(&self, storage: &impl Storage, out: W, done: &mut dyn FnMut()) -> Result<(W, Recovered)> {
-        let features = Features { packing: self.metadata.packing(), described: self.description.is_some() };
+        let features = Features { described: self.description.is_some(), ..self.metadata.features() };
         let mut writer = Writer::with_features(out, self.id, &self.metadata, features)?;
-        let mut lost = Vec::new();
+        let mut lost: Vec<BlockId> = Vec::new();
         for window in 0..self.metadata.windows.len() as u32 {
             writer.begin_window(self.metadata.window_record(window))?;
             let mut end = WindowEnd::empty(window);
-            for (first, count) in leaves_of(&self.metadata, window) {
+            for (first, count) in leaves_of(&self.metadata, window, self.metadata.tiers(window)) {
                 let entries = self.leaf(storage, first, count);
                 for (block, entry) in (first.block..).zip(entries) {
                     let id = BlockId { block, ..first };
-                    match self.block(storage, id, entry)? {
+                    // Blocks come after the one above them, in the order of their ids.
+                    let has_lost = id.tier < self.metadata.tiers(id.window)
+                        && lost.binary_search(&self.metadata.above(id)).is_ok();
+                    match if has_lost { None } else { self.block(storage, id, entry)? } {
                         Some(block) => {
                             end.add(&block);
                             writer.append(&block)?;
@@ -323,7 +326,7 @@ impl FoundSections {
             .ok_or_else(|| unrecoverable("start and metadata are missing, so the size of the volume is unknown"))?;
         let mut undescribed = Vec::new();
         let count = windows.last_key_value().map_or(0, |(number, _)| u64::from(*number) + 1);
-        let per_window = u64::from(all.blocks_per_channel()) * u64::from(all.channels);
+        let per_window = u64::from(all.blocks_per_channel(0)) * u64::from(all.channels);
         let least = count.saturating_mul(per_window.saturating_mul(MIN_BLOCK).saturating_add(MIN_WINDOW));
         if least > len.saturating_mul(MAX_LOST_RATIO) {
             return Err(unrecoverable("the file is too short for the number of blocks in its records"));
@@ -370,7 +373,7 @@ fn id_at(storage: &impl Storage, at: u64) -> Result<BlockId> {
     let mut bytes = [0; 10];
     storage.read_at(at.saturating_add(FRAME as u64), &mut bytes)?;
     let mut fields = FieldReader::new(&bytes);
-    let mut id = || Ok(BlockId { window: fields.u32()?, block: fields.u32()?, channel: fields.u16()? });
+    let mut id = || Ok(BlockId::at_place(fields.u32()?, fields.u32()?, fields.array()?));
     id().map_err(|what: String| SectionId::Root.corrupt(at, what))
 }
 

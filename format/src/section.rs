@@ -58,7 +58,7 @@ pub(crate) enum SectionId {
 impl SectionId {
     /// The block, and kind and level, in the seed.
     fn identity(self) -> (BlockId, [u8; 2]) {
-        let none = BlockId { window: 0, block: 0, channel: 0 };
+        let none = BlockId::new(0, 0, 0);
         match self {
             Self::Part(id, kind) => (id, kind.code()),
             Self::Block(id) => (id, [16, 0]),
@@ -94,7 +94,7 @@ impl SectionId {
         seed.put(&file.0);
         seed.put_u32(id.window);
         seed.put_u32(id.block);
-        seed.put_u16(id.channel);
+        seed.put(&id.place());
         seed.put(&kind);
         xxh3_64_with_seed(stored, xxh3_64(&seed))
     }

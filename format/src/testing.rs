@@ -155,9 +155,11 @@ pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, C
     let (mut random, mut compressor) = (Random(seed), Compressor::new(3).expect("level 3"));
     let mut found = Vec::new();
     for window in 0..metadata.windows.len() as u32 {
-        for channel in 0..metadata.channels {
-            for block in 0..metadata.blocks_per_channel() {
-                let id = BlockId { window, block, channel };
+        for (tier, channel) in
+            (0..=metadata.tiers(window)).rev().flat_map(|t| (0..metadata.channels).map(move |c| (t, c)))
+        {
+            for block in 0..metadata.blocks_per_channel(tier) {
+                let id = BlockId { tier, ..BlockId::new(window, channel, block) };
                 let geometry = metadata.geometry(id).expect("in the archive");
                 let content = content(&geometry, &mut random);
                 found.push((encode(id, &content, &geometry, &mut compressor), content));

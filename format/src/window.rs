@@ -4,7 +4,7 @@ use crate::bytes::{ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::limits::*;
 use crate::pyramid::Packing;
 use crate::record::{decode_exact, encode};
-use crate::{BlockStats, EncodedBlock, PartKind, Pyramid};
+use crate::{BlockStats, EncodedBlock, Features, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
 /// The transform along time. New kinds are only appended.
@@ -211,10 +211,18 @@ impl Window {
         self.pyramid.as_ref().map_or(Packing::Flat, |pyramid| pyramid.packing)
     }
 
-    /// Checks that the file's header announces how the codes are packed.
-    pub(crate) fn check_packing(&self, announced: Packing) -> ParseResult {
-        let known = announced == Packing::Nested || self.packing() == Packing::Flat;
-        ensure(known, || "a window with nested parts, which the header does not announce".into())
+    /// Checks that the file's header announces what the window has.
+    pub(crate) fn check_announced(&self, announced: Features) -> ParseResult {
+        let known = announced.packing == Packing::Nested || self.packing() == Packing::Flat;
+        ensure(known, || "a window with nested parts, which the header does not announce".into())?;
+        ensure(announced.tiered || self.tiers() == 0, || {
+            "a window with tiers, which the header does not announce".into()
+        })
+    }
+
+    /// Number of tiers above its blocks.
+    pub fn tiers(&self) -> u8 {
+        self.pyramid.as_ref().map_or(0, |pyramid| pyramid.tiers)
     }
 
     /// Number of level parts that a block can have.

@@ -53,15 +53,17 @@ pub struct Writer<W: Write> {
     leaf: Option<LeafEntry>,
     entries: Vec<u8>,
     leaves: Vec<LeafEntry>,
+    /// The number of leaves of the ended windows.
+    ended_leaves: usize,
 }
 
 impl<W: Write> Writer<W> {
-    /// Starts a file without a description whose codes are packed like those of the windows in `metadata`.
+    /// Starts a file without a description with the features of the windows in `metadata`.
     ///
     /// # Errors
     /// As [`Self::with_features`].
     pub fn new(out: W, id: FileId, metadata: &Metadata) -> Result<Self> {
-        Self::with_features(out, id, metadata, metadata.packing().into())
+        Self::with_features(out, id, metadata, metadata.features())
     }
 
     /// Starts a file: writes its header and its start, which is the metadata that does not depend on frames.
@@ -101,6 +103,7 @@ impl<W: Write> Writer<W> {
             stored,
             leaf,
             entries,
+            ended_leaves: leaves.len(),
             leaves,
         }
     }
@@ -127,7 +130,7 @@ impl<W: Write> Writer<W> {
         let next = WindowRecord::parse(&bytes).and_then(|record| {
             let next = self.window.is_none() && record.number as usize == self.metadata.windows.len();
             ensure(next, || format!("window {} out of order", record.number))?;
-            record.window.check_packing(self.features.packing)
+            record.window.check_announced(self.features)
         });
         next.map_err(Error::Invalid)?;
         self.count_record(bytes.len())?;
@@ -196,14 +199,14 @@ impl<W: Write> Writer<W> {
         let bytes = end.encode().map_err(Error::Invalid)?;
         let record = self.window.take().ok_or_else(|| Error::Invalid(format!("window {number} was not begun")))?;
         self.metadata.push(record, end).map_err(Error::Invalid)?;
-        let leaves =
-            &self.leaves[self.leaves.len().min(number as usize * self.metadata.leaves_per_window() as usize)..];
-        let whole = leaves.len() as u64 == self.metadata.leaves_per_window();
+        let leaves = &self.leaves[self.ended_leaves..];
+        let whole = leaves.len() as u64 == self.metadata.leaves_of_window(number);
         let checked = ensure(whole, || format!("window {number}: blocks are missing"))
             .and_then(|()| check_window(&self.metadata, number, leaves, self.ended));
         checked.map_err(Error::Invalid)?;
         self.write_section(SectionId::WindowEnd(number), &bytes, bytes.len())?;
         (self.ended, self.last, self.intact) = (self.position, None, true);
+        self.ended_leaves = self.leaves.len();
         Ok(())
     }
 
@@ -251,11 +254,15 @@ impl<W: Write> Writer<W> {
     fn check_follows(&self, id: BlockId) -> Result<()> {
         let window = self.metadata.windows.len() as u32;
         let follows = match self.last {
-            None => self.window.is_some() && id == BlockId { window, block: 0, channel: 0 },
+            None => {
+                let tiers = self.window.as_ref().map(|record| record.window.tiers());
+                tiers.is_some_and(|tier| id == BlockId { tier, ..BlockId::new(window, 0, 0) })
+            }
             Some(last) => {
                 let next_block = BlockId { block: last.block.wrapping_add(1), ..last };
                 let next_channel = BlockId { block: 0, channel: last.channel.wrapping_add(1), ..last };
-                last < id && (id == next_block || id == next_channel)
+                let next_tier = BlockId { block: 0, channel: 0, tier: last.tier.wrapping_sub(1), ..last };
+                last < id && (id == next_block || id == next_channel || id == next_tier)
             }
         };
         if follows { Ok(()) } else { Err(Error::Invalid(format!("{id} after {:?}", self.last))) }
@@ -263,7 +270,7 @@ impl<W: Write> Writer<W> {
 
     /// Ends the current leaf if `id` does not belong to it.
     fn start_leaf_for(&mut self, id: BlockId) -> Result<()> {
-        let other = |leaf: LeafEntry| leaf.channel != id.channel;
+        let other = |leaf: LeafEntry| leaf.channel != id.channel || leaf.tier != id.tier;
         let full = |leaf: LeafEntry| u32::from(leaf.count) == BLOCKS_PER_LEAF;
         if self.leaf.is_some_and(|leaf| other(leaf) || full(leaf)) { self.flush_leaf() } else { Ok(()) }
     }

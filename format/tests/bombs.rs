@@ -97,7 +97,7 @@ fn file() -> Vec<u8> {
         writer.begin_window(WindowRecord { number, window: begun, times }).expect("next");
         let mut end = WindowEnd::empty(number);
         for block in 0..2 {
-            let block = self::block(BlockId { window: number, block, channel: 0 }, &mut compressor);
+            let block = self::block(BlockId::new(number, 0, block), &mut compressor);
             end.add(&block);
             writer.append(&block).expect("next");
         }

@@ -96,8 +96,8 @@ pub(crate) fn stored_with_a_lie(
         for block in 0..file.blocks.len() {
             let region = file.blocks.region(block);
             let bytes = read_frames(samples.as_ref(), 0..frames.len(), &region, file.sample()).unwrap();
-            let id = BlockId { window, block: block as u32, channel: 0 };
-            let mut encoded = encoder.block(&codec, id, region.dims(), &bytes).unwrap().block;
+            let id = BlockId::new(window, 0, block as u32);
+            let mut encoded = encoder.block(&codec, id, region.dims(), &bytes, None).unwrap().block;
             if (id.window, id.block) == place {
                 lie(&mut encoded, &mut metadata);
             }

@@ -15,7 +15,12 @@ pub(crate) struct Pyramid {
     pub(crate) nested: bool,
     /// Whether there are ghost nodes.
     pub(crate) ghosts: bool,
+    /// The number of tiers above tier 0.
+    pub(crate) tiers: u8,
 }
+
+/// The value of a node that the block above has.
+pub(crate) type Known<'a> = &'a dyn Fn([usize; 4]) -> f64;
 
 /// A pass: its level, and the axis along which it adds nodes (none for the first pass).
 #[derive(Debug, Clone, Copy)]
@@ -31,15 +36,39 @@ impl Pyramid {
         std::array::from_fn(|a| extents[a] + usize::from(ghost(a)))
     }
 
-    /// All nodes that a pass adds, in the order of their codes.
-    pub(crate) fn added(&self, pass: Pass, extents: [usize; 4]) -> impl Iterator<Item = [usize; 4]> {
-        nodes(self.outer(extents)).filter(move |node| self.adds(pass, extents, *node))
+    /// All nodes that a pass of a tier's block adds, with its known ones, in the order of their codes.
+    pub(crate) fn added(&self, pass: Pass, extents: [usize; 4], tier: u8) -> impl Iterator<Item = [usize; 4]> {
+        let added = move |node: &[usize; 4]| self.is_in_tier(*node, tier) && self.adds(pass, extents, tier, *node);
+        nodes(self.outer(extents)).filter(added)
     }
 
-    /// The passes over a block of these extents, coarse to fine.
-    pub(crate) fn passes(&self, extents: [usize; 4]) -> Vec<Pass> {
+    /// Whether a node is on the lattice of a tier.
+    fn is_in_tier(&self, node: [usize; 4], tier: u8) -> bool {
+        node[..3].iter().all(|at| at.is_multiple_of(1 << tier))
+    }
+
+    /// The nodes of a tier's block, in the order of their numbers.
+    pub(crate) fn nodes_of(&self, extents: [usize; 4], tier: u8) -> impl Iterator<Item = [usize; 4]> {
+        let all = if tier > 0 { self.outer(extents) } else { extents };
+        nodes(all).filter(move |node| self.is_in_tier(*node, tier))
+    }
+
+    /// The passes over a tier's block of these extents, coarse to fine.
+    pub(crate) fn passes(&self, extents: [usize; 4], tier: u8) -> Vec<Pass> {
+        let level = u32::from(tier);
+        let is_after = |axis: usize| self.order.first() != Some(&axis); // comes after a pass in space of its level
+        let own = |pass: &Pass| match (pass.axis, tier == self.tiers) {
+            (None, is_last) => is_last,
+            (Some(3), is_last) => is_last || pass.level < level || pass.level == level && is_after(3),
+            (Some(_), true) => pass.level >= level,
+            (Some(_), false) => pass.level == level,
+        };
+        self.all_passes(extents).into_iter().filter(own).collect()
+    }
+
+    fn all_passes(&self, extents: [usize; 4]) -> Vec<Pass> {
         let extents = self.outer(extents);
-        let mut top = 0;
+        let mut top = u32::from(self.tiers);
         while self.order.iter().any(|&axis| extents[axis] > 1 << top) {
             top += 1;
         }
@@ -54,14 +83,15 @@ impl Pyramid {
         passes
     }
 
-    /// The level part that holds the code of a node that a pass adds.
-    pub(crate) fn part(&self, pass: Pass, node: [usize; 4]) -> usize {
-        let multiples = |of: usize| (0..3).all(|a| !self.order.contains(&a) || node[a].is_multiple_of(of));
-        match (pass.axis, pass.level) {
+    /// The level part that holds the code of a node that a pass of a tier's block adds.
+    pub(crate) fn part(&self, pass: Pass, node: [usize; 4], tier: u8) -> usize {
+        let multiples = |of: usize| (0..3).all(|a| !self.order.contains(&a) || node[a].is_multiple_of(of << tier));
+        let is_last = tier == self.tiers;
+        match (pass.axis, pass.level.saturating_sub(self.tiers.into())) {
             (None, _) => 0,
-            (Some(3), _) if self.nested && multiples(4) => 0,
-            (Some(3), _) if self.nested && multiples(2) => 1,
-            (Some(3), 0) if self.order.last() == Some(&3) => 3,
+            (Some(3), _) if is_last && self.nested && multiples(4) => 0,
+            (Some(3), _) if is_last && self.nested && multiples(2) => 1,
+            (Some(3), _) if pass.level == 0 && self.order.last() == Some(&3) => 3,
             (_, 0) => 2,
             (_, 1) => 1,
             _ => 0,
@@ -69,7 +99,7 @@ impl Pyramid {
     }
 
     /// Whether a pass adds the node. Ghost nodes are in lattices of more than distance 1.
-    fn adds(&self, pass: Pass, extents: [usize; 4], node: [usize; 4]) -> bool {
+    fn adds(&self, pass: Pass, extents: [usize; 4], tier: u8, node: [usize; 4]) -> bool {
         let place = |a: usize| self.order.iter().position(|&b| b == a);
         let stride = 1 << pass.level;
         let distance = |a: usize| match (place(a), pass.axis) {
@@ -78,7 +108,7 @@ impl Pyramid {
             (earlier, Some(axis)) if earlier <= place(axis) => stride,
             _ => 2 * stride,
         };
-        if (0..4).any(|a| node[a] >= extents[a] && distance(a) == 1) {
+        if (0..4).any(|a| node[a] >= extents[a] && distance(a) == 1 && tier == 0) {
             return false;
         }
         let Some(axis) = pass.axis else { return self.order.iter().all(|&a| node[a] == 0) };
@@ -128,21 +158,41 @@ impl Pyramid {
         sum.unwrap()
     }
 
-    /// Computes all nodes of a block from all of its codes, pass after pass.
+    /// Computes all nodes of a block without tiers from all of its codes, pass after pass.
     pub(crate) fn decode(&self, extents: [usize; 4], step: f64, codes: &[i32]) -> Vec<f64> {
+        self.decode_tier(extents, 0, step, codes, &|_| f64::NAN)
+    }
+
+    /// Computes all nodes of a tier's block from all of its codes, with zeros for known nodes, and from the block above.
+    pub(crate) fn decode_tier(
+        &self,
+        extents: [usize; 4],
+        tier: u8,
+        step: f64,
+        codes: &[i32],
+        known: Known<'_>,
+    ) -> Vec<f64> {
         let outer = self.outer(extents);
         let mut values = vec![f64::NAN; nodes(outer).count()];
+        let is_known = |node: [usize; 4]| tier < self.tiers && self.is_in_tier(node, tier + 1);
+        for node in nodes(outer).filter(|node| is_known(*node)) {
+            values[number(outer, node)] = known(node);
+        }
         let mut codes = codes.iter();
-        for pass in self.passes(extents) {
+        for pass in self.passes(extents, tier) {
             let step = self.round(self.step(step, pass.level));
-            for node in self.added(pass, extents) {
+            for node in self.added(pass, extents, tier) {
                 let q = self.round(f64::from(*codes.next().unwrap()));
+                if is_known(node) {
+                    assert_eq!(q, 0.0, "a code of a known node");
+                    continue;
+                }
                 let p = self.prediction(pass, outer, node, &values);
                 values[number(outer, node)] = self.round(p + self.round(q * step));
             }
         }
         assert!(codes.next().is_none(), "codes are left");
-        nodes(extents).map(|node| values[number(outer, node)]).collect()
+        self.nodes_of(extents, tier).map(|node| values[number(outer, node)]).collect()
     }
 }
 
@@ -301,21 +351,32 @@ mod tests {
             single: false,
             nested: false,
             ghosts: false,
+            tiers: 0,
         };
         let extents = [5, 1, 1, 1];
         assert_eq!(pyramid.decode(extents, 1.0, &[8, 4, 2, 1, -1]), [2.0, 4.0, 3.5, 2.5, 3.0]);
-        let parts: Vec<usize> = pyramid.passes(extents).into_iter().map(|pass| pyramid.part(pass, [0; 4])).collect();
+        let parts: Vec<usize> =
+            pyramid.passes(extents, 0).into_iter().map(|pass| pyramid.part(pass, [0; 4], 0)).collect();
         assert_eq!(parts, [0, 0, 1, 2]);
     }
 
     #[test]
     fn every_node_is_added_once() {
         for order in [vec![0, 1, 2, 3], vec![3, 1], vec![2], vec![]] {
-            let pyramid =
-                Pyramid { order, cubic: false, growth: 1.0, most: 1.0, single: false, nested: false, ghosts: false };
+            let pyramid = Pyramid {
+                order,
+                cubic: false,
+                growth: 1.0,
+                most: 1.0,
+                single: false,
+                nested: false,
+                ghosts: false,
+                tiers: 0,
+            };
             for extents in [[1, 1, 1, 1], [5, 3, 2, 9], [4, 8, 1, 2]] {
-                let added =
-                    |node| pyramid.passes(extents).iter().filter(|pass| pyramid.adds(**pass, extents, node)).count();
+                let added = |node| {
+                    pyramid.passes(extents, 0).iter().filter(|pass| pyramid.adds(**pass, extents, 0, node)).count()
+                };
                 assert!(nodes(extents).all(|node| added(node) == 1), "{pyramid:?} {extents:?}");
             }
         }

@@ -1,4 +1,4 @@
-"""Reader of coefficient files (.wspl), versions 1.0 and 1.1, written from format/FORMAT.md alone.
+"""Reader of coefficient files (.wspl), versions 1.0 to 1.2, written from format/FORMAT.md alone.
 
     python wspl.py info FILE              metadata as JSON
     python wspl.py check FILE             everything in the file is as the format says
@@ -20,6 +20,7 @@ import sys
 from collections import namedtuple
 from dataclasses import dataclass, fields
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 import xxhash
@@ -35,6 +36,8 @@ MAX_PARTS = 35
 MAX_WINDOW_FRAMES = 1025
 MAX_COEFFICIENTS = 4100
 MAX_DIM = 2147483648
+MAX_CHANNELS = 256
+MAX_TIERS = 24
 MAX_FRAMES = 9007199254740992
 MAX_METADATA = 16777216
 MAX_ROOT_RAW = 1073741824
@@ -43,6 +46,8 @@ MAX_DESCRIPTION_ITEMS = 65536
 
 MAGIC = bytes.fromhex("89 57 53 50 0D 0A 1A 0A")
 END_MAGIC = bytes.fromhex("89 57 53 50 45 4E 44 0A")
+KEPT_LEAVES = 16  # read leaves that an archive keeps
+LOST = "lost, or below a lost block: data were missing when the file was recovered"
 
 class Layout:
     """A structure of fixed length: the names and `struct` codes of its fields, without padding."""
@@ -68,7 +73,7 @@ FOOTER = Layout(
 FRAME = Layout("Frame", "tag 4s stored I raw I reserved I checksum Q")
 BLOCK = Layout(
     "BlockEntry",
-    "window I block I channel H count H lost I step d min d max d reached d squared_error d dropped d",
+    "window I block I channel B tier B count H lost I step d min d max d reached d squared_error d dropped d",
 )
 PART = Layout(
     "Part",
@@ -76,8 +81,8 @@ PART = Layout(
 )
 LEAF = Layout(
     "Leaf",
-    "window I first_block I channel H count H stored I raw I exact I data_offset Q offset Q checksum Q min d max d"
-    " reached d squared_error d energy d dropped d coded Q outliers Q missing Q lost Q",
+    "window I first_block I channel B tier B count H stored I raw I exact I data_offset Q offset Q checksum Q min d"
+    " max d reached d squared_error d energy d dropped d coded Q outliers Q missing Q lost Q",
 )
 
 # Kinds of parts and sections (section 4).
@@ -189,15 +194,19 @@ class Pyramid:
     stencil: str
     growth: float
     most: float
-    flags: int
+    flags: int  # bits 0 to 2
+    tiers: int  # bits 3 to 7: tiers above the blocks
 
     @staticmethod
     def read(r: Record) -> "Pyramid":
         order = tuple(r.list(lambda: r.variant(AXES)))
-        p = Pyramid(order, r.variant(STENCILS), *r.get("ddB"))
+        stencil, growth, most, bits = r.variant(STENCILS), *r.get("ddB")
+        p = Pyramid(order, stencil, growth, most, bits & 7, bits >> 3)
         need(len(set(order)) == len(order), r.place, "an axis is refined twice")
         need(1 <= p.growth <= 1e6 and 1 <= p.most <= 1e6, r.place, "growth or most is not in 1 .. 10^6")
-        need(p.flags <= 7 and p.flags & 6 != 4, r.place, "unknown flags")
+        need(p.nested or not (p.flags & 4 or p.tiers), r.place, "ghost nodes or tiers without nested parts")
+        need(p.tiers <= MAX_TIERS, r.place, "too many tiers")
+        need(not p.tiers or {"x", "y", "z"} <= set(order), r.place, "tiers, but an axis of space is not refined")
         return p
 
     @property
@@ -212,6 +221,11 @@ class Pyramid:
         """1 along axes with ghost nodes."""
         axes = [a for a in range(3) if self.flags & 4 and AXES[a] in self.order and extents[a] % 2 == 0]
         return tuple(int(a in axes) for a in range(4))
+
+    def lattice(self, extents: tuple[int, ...], tier: int) -> tuple[int, ...]:
+        """Nodes of a block along x, y, z, t, ghost nodes included; its box has `extents` in voxels and coefficients."""
+        units = (1 << tier, 1 << tier, 1 << tier, 1)
+        return tuple(-(-(n + g) // u) for n, g, u in zip(extents, self.ghosts(extents), units))
 
 
 @dataclass(frozen=True, eq=False)  # eq=False: hashed by identity, for the caches below
@@ -268,6 +282,11 @@ class Window:
     def level_parts(self) -> int:
         return 4 if self.pyramid else len(self.levels)
 
+    @property
+    def tiers(self) -> int:
+        """Above the blocks."""
+        return self.pyramid.tiers if self.pyramid else 0
+
 
 @dataclass
 class Metadata:
@@ -309,16 +328,18 @@ class Metadata:
         place = "metadata"
         need(all(1 <= n <= MAX_DIM for n in self.dims), place, "an extent is 0 or too large")
         need(finite(*self.spacing, *self.origin), place, "the grid is not finite")
-        need(self.block_edge >= 1 and self.channels >= 1, place, "no block edge or no channel")
+        need(self.block_edge >= 1, place, "no block edge")
+        need(1 <= self.channels <= MAX_CHANNELS, place, "no channel or too many")
         need(self.frames <= MAX_FRAMES, place, "too many frames")
         need(len(self.times) in (0, self.frames), place, "times do not fit the frames")
         need(np.isfinite(self.times).all(), place, "a time is not finite")
-        need(self.blocks < 1 << 32, place, "too many blocks")
+        need(self.blocks(0) < 1 << 32, place, "too many blocks")
         largest = math.prod(min(self.block_edge, n) for n in self.dims)
         frame = 0
         for w in self.windows:
             need(w.first_frame == frame, place, f"no window begins with frame {frame}")
             need(largest * max(w.frames, w.coefficients) <= MAX_BLOCK_SAMPLES, place, "blocks are too large")
+            need(w.tiers == 0 or self.block_edge % 2 == 0, place, "tiers, but an odd block edge")
             frame += w.frames
         need(frame == self.frames, place, "windows do not cover the frames")
 
@@ -326,21 +347,52 @@ class Metadata:
     def dtype(self) -> np.dtype:
         return np.dtype("<" + self.sample[0] + str(int(self.sample[1:]) // 8))
 
-    @property
-    def grid(self) -> tuple[int, ...]:
-        return tuple(-(-n // self.block_edge) for n in self.dims)
+    def grid(self, tier: int) -> tuple[int, ...]:
+        return tuple(-(-n // (self.block_edge << tier)) for n in self.dims)
 
-    @property
-    def blocks(self) -> int:
+    def blocks(self, tier: int) -> int:
         """Of one window and channel."""
-        return math.prod(self.grid)
+        return math.prod(self.grid(tier))
 
-    def box(self, block: int) -> tuple[slice, slice, slice]:
+    def position(self, block: int, tier: int) -> tuple[int, int, int]:
+        """bx, by, bz of a block (section 1)."""
+        nx, ny, _ = self.grid(tier)
+        return (block % nx, block // nx % ny, block // (nx * ny))
+
+    def number(self, position: tuple[int, int, int], tier: int) -> int:
+        """Of the block at bx, by, bz."""
+        nx, ny, _ = self.grid(tier)
+        return position[0] + nx * (position[1] + ny * position[2])
+
+    def above(self, block: int, tier: int) -> int:
+        """The number of the block above."""
+        return self.number(tuple(b // 2 for b in self.position(block, tier)), tier + 1)
+
+    def box(self, block: int, tier: int) -> tuple[slice, slice, slice]:
         """The voxels of a block along x, y, z (section 1)."""
-        nx, ny, _ = self.grid
-        number = (block % nx, block // nx % ny, block // (nx * ny))
-        edge = self.block_edge
-        return tuple(slice(b * edge, min((b + 1) * edge, n)) for b, n in zip(number, self.dims))
+        edge = self.block_edge << tier
+        return tuple(slice(b * edge, min((b + 1) * edge, n)) for b, n in zip(self.position(block, tier), self.dims))
+
+    def runs(self, window: int):
+        """Tier, channel and first block of a window's leaves, in their order."""
+        for tier in range(self.windows[window].tiers, -1, -1):
+            for channel in range(self.channels):
+                for first in range(0, self.blocks(tier), BLOCKS_PER_LEAF):
+                    yield tier, channel, first
+
+    def descent(self, window: int):
+        """Tier and number of a channel's blocks, each right before those below it: few decoded ones have to be kept."""
+
+        def from_block(tier: int, position: tuple[int, int, int]):
+            yield tier, self.number(position, tier)
+            if tier:
+                below = [range(2 * b, min(2 * b + 2, n)) for b, n in zip(position, self.grid(tier - 1))]
+                for z, y, x in product(*below[::-1]):
+                    yield from from_block(tier - 1, (x, y, z))
+
+        top = self.windows[window].tiers
+        for z, y, x in product(*map(range, self.grid(top)[::-1])):
+            yield from from_block(top, (x, y, z))
 
     def window_section(self, number: int) -> bytes:
         """The record of a window section: number, the window with the totals of no blocks, then its times."""
@@ -379,7 +431,12 @@ class Block(namedtuple("Block", BLOCK.type._fields + ("parts", "bytes"))):
 
     @property
     def place(self) -> str:
-        return f"window {self.window}, channel {self.channel}, block {self.block}"
+        return f"window {self.window}, tier {self.tier}, channel {self.channel}, block {self.block}"
+
+    @property
+    def where(self) -> tuple[int, int, int, int]:
+        """What its checksums depend on."""
+        return (self.window, self.block, self.channel, self.tier)
 
     @property
     def exact(self) -> bool:
@@ -394,7 +451,7 @@ class Block(namedtuple("Block", BLOCK.type._fields + ("parts", "bytes"))):
 
 
 def name_of(leaf) -> str:
-    return f"leaf of window {leaf.window}, channel {leaf.channel}, block {leaf.first_block}"
+    return f"leaf of window {leaf.window}, tier {leaf.tier}, channel {leaf.channel}, block {leaf.first_block}"
 
 
 def sums(blocks: list[Block]) -> dict:
@@ -402,9 +459,9 @@ def sums(blocks: list[Block]) -> dict:
     energies = [p.energy for b in blocks for p in b.parts if p.kind == LEVEL]
     return {
         "exact": sum(b.exact for b in blocks),
-        "min": min(b.min for b in blocks),
-        "max": max(b.max for b in blocks),
-        "reached": max(b.reached for b in blocks),
+        "min": min((b.min for b in blocks), key=ascending),
+        "max": max((b.max for b in blocks), key=ascending),
+        "reached": max([0.0, *[b.reached for b in blocks]], key=ascending),
         "squared_error": plain_sum(b.squared_error for b in blocks),
         "energy": plain_sum(energies),
         "dropped": plain_sum(b.dropped for b in blocks),
@@ -413,6 +470,16 @@ def sums(blocks: list[Block]) -> dict:
         "missing": sum(b.count_of(MISSING) for b in blocks),
         "lost": sum(b.lost for b in blocks),
     }
+
+
+def ascending(value: float) -> tuple[float, float]:
+    """-0 is smaller than 0."""
+    return (value, math.copysign(1, value))
+
+
+def same(a, b) -> bool:
+    """To the bit: -0 is not 0."""
+    return ascending(a) == ascending(b)
 
 
 def plain_sum(values) -> float:
@@ -433,14 +500,18 @@ def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int) -
     if b.lost:
         empty = not b.parts and b.min == math.inf
         need(empty and b.step == b.reached == b.squared_error == b.dropped == 0, place, "not empty, but lost")
+    if b.tier:
+        empty = b.min == math.inf and b.reached == b.squared_error == b.dropped == 0
+        need(empty, place, "range or errors, but no samples of its own")
+        need(all(p.kind == LEVEL for p in b.parts), place, "parts that are no levels in a tier above 0")
     keys = [(p.kind, p.level) for p in b.parts]
     need(all(k < l for k, l in zip(keys, keys[1:])), place, "parts do not ascend")
     need(not b.exact or all(p.kind in (MISSING, EXACT) for p in b.parts), place, "exact beside levels or outliers")
     for p in b.parts:
-        check_part(p, w, size, sample_bytes, f"{place}, part of kind {p.kind}, level {p.level}")
+        check_part(p, w, b.tier, size, sample_bytes, f"{place}, part of kind {p.kind}, level {p.level}")
 
 
-def check_part(p, w: Window, size: tuple[int, ...], s: int, place: str) -> None:
+def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: str) -> None:
     need(p.reserved == p.reserved_too == 0, place, "reserved bytes are not zero")
     need(p.kind <= EXACT, place, "there is no such kind")
     need(p.level < (w.level_parts if p.kind == LEVEL else 1), place, "there is no such level")
@@ -451,7 +522,7 @@ def check_part(p, w: Window, size: tuple[int, ...], s: int, place: str) -> None:
     samples = voxels * w.frames
     most = samples
     if p.kind == LEVEL and w.pyramid:
-        mine = [b.counts for b in boxes((*size, w.coefficients), w.pyramid) if b.part == p.level]
+        mine = [b.counts for b in boxes((*size, w.coefficients), w.pyramid, tier) if b.part == p.level]
         most = sum(map(math.prod, mine))
         fits = p.raw <= lattice_most(sum(math.prod(cells_of(b)) for b in mine), most)
     elif p.kind == LEVEL:
@@ -731,37 +802,53 @@ class Pass:
     part: int
     level: int
     axis: int | None  # None: the first pass
-    first: tuple[int, ...]  # f and d along x, y, z, t
+    first: tuple[int, ...]  # f and d along x, y, z, t, on the lattice of the tier
     stride: tuple[int, ...]
     counts: tuple[int, ...]  # nodes along x, y, z, t
 
 
 @lru_cache(256)
-def passes(extents: tuple[int, ...], p: Pyramid) -> list[Pass]:
-    """The passes of a block in their order, each with the part that its codes are in without nested parts."""
+def passes(extents: tuple[int, ...], p: Pyramid, tier: int) -> list[Pass]:
+    """The passes of a block in their order, each with the part that its codes are in without nested parts.
+
+    `extents` are the voxels of its box and its coefficients.
+    """
     axes = [AXES.index(a) for a in p.order]
     outer = tuple(n + g for n, g in zip(extents, p.ghosts(extents)))
-    top = max([(outer[a] - 1).bit_length() for a in axes], default=0)
+    top = max(p.tiers, max([(outer[a] - 1).bit_length() for a in axes], default=0))
+    unit = 1 << tier
+    units = (unit, unit, unit, 1)
 
     def one(part: int, level: int, axis: int | None, along: dict) -> Pass:
         first, stride = zip(*[along.get(a, (0, 1)) for a in range(4)])
+        stride = [max(d, u) for d, u in zip(stride, units)]
         apart = [d // 2 if a == axis else d for a, d in enumerate(stride)]  # the distance of all nodes so far
         ends = [o if d > 1 else n for n, o, d in zip(extents, outer, apart)]
         counts = tuple(-(-(n - f) // d) for n, f, d in zip(ends, first, stride))
-        return Pass(part, level, axis, first, stride, counts)
+        on_lattice = [tuple(n // u for n, u in zip(numbers, units)) for numbers in (first, stride)]
+        return Pass(part, level, axis, *on_lattice, counts)
 
-    out = [one(0, top, None, {a: (0, 1 << top) for a in axes})]
+    out = [one(0, top, None, {a: (0, 1 << top) for a in axes})] if tier == p.tiers else []
     for level in range(top - 1, -1, -1):
         near, far = 1 << level, 2 << level
         for at, axis in enumerate(axes):
-            if outer[axis] <= near:
+            if outer[axis] <= near or not in_tier(level, axis, tier, p):
                 continue
             along = {a: (0, near if i < at else far) for i, a in enumerate(axes)}
             along[axis] = (near, far)
             last_t = axis == 3 and at == len(axes) - 1
-            part = 0 if level >= 2 else 1 if level == 1 else 3 if last_t else 2
+            part = 3 if last_t and level == 0 else max(0, min(2, p.tiers + 2 - level))
             out.append(one(part, level, axis, along))
     return out
+
+
+def in_tier(level: int, axis: int, tier: int, p: Pyramid) -> bool:
+    """Whether the blocks of a tier have this pass."""
+    if tier == p.tiers:
+        return axis == 3 or level >= tier
+    if axis == 3:
+        return level < tier or (level == tier and p.order[0] != "t")  # then t comes after an axis of space
+    return level == tier
 
 
 @dataclass(frozen=True)
@@ -770,15 +857,19 @@ class Box:
     number: int  # of its pass
     steps: tuple[int, int, int]  # s along x, y, z
     counts: tuple[int, ...]  # codes along x, y, z, t
-    others: tuple[int, ...]  # nodes at even numbers along all of these axes belong to another box; empty: no such nodes
+    others: tuple[int, ...]  # nodes at even numbers along all of these axes have no code in this box; empty: no such nodes
 
 
-def boxes(extents: tuple[int, ...], p: Pyramid) -> list[Box]:
+@lru_cache(256)
+def boxes(extents: tuple[int, ...], p: Pyramid, tier: int) -> list[Box]:
     """The boxes of a block's codes, in the order of their passes."""
     out = []
-    for number, q in enumerate(passes(extents, p)):
+    for number, q in enumerate(passes(extents, p, tier)):
         if not (p.nested and q.axis == 3):
             out.append(Box(q.part, number, (1, 1, 1), q.counts, ()))
+            continue
+        if tier < p.tiers:
+            out.append(Box(q.part, number, (1, 1, 1), q.counts, tuple(a for a in range(3) if q.stride[a] == 1)))
             continue
 
         def steps(n: int) -> tuple[int, ...]:
@@ -821,11 +912,17 @@ def level_step(step: float, level: int, p: Pyramid) -> float:
     return step / g
 
 
-def rebuild(codes: dict, step: float, extents: tuple[int, ...], p: Pyramid) -> np.ndarray:
-    """The coefficients [k, voxel] from the codes of the passes; a pass without codes has zeros."""
+def rebuild(codes: dict, step: float, extents: tuple[int, ...], p: Pyramid, tier: int, known) -> np.ndarray:
+    """The nodes [k, z, y, x], ghost nodes included, from the codes of the passes; a pass without codes has zeros.
+
+    `known` are the nodes at even numbers along x, y, z: those of the block above. None: there is none above.
+    """
     precision = np.float32 if p.single else np.float64
-    nodes = np.zeros([n + g for n, g in zip(extents, p.ghosts(extents))][::-1], precision)
-    for number, q in enumerate(passes(extents, p)):
+    nodes = np.zeros(p.lattice(extents, tier)[::-1], precision)
+    even = nodes[:, ::2, ::2, ::2]
+    if known is not None:
+        even[:] = known
+    for number, q in enumerate(passes(extents, p, tier)):
         s = precision(level_step(step, q.level, p))
         part = [slice(f, f + n * d, d) for f, n, d in zip(q.first, q.counts, q.stride)][::-1]
         base = precision(0)
@@ -836,8 +933,9 @@ def rebuild(codes: dict, step: float, extents: tuple[int, ...], p: Pyramid) -> n
             base = np.moveaxis(predict(e, q.counts[q.axis], p.stencil), 0, 3 - q.axis)
         amount = codes[number].astype(precision) * s if number in codes else precision(0)
         nodes[tuple(part)] = base + amount
-    own = nodes[tuple(slice(0, n) for n in extents[::-1])]
-    return own.reshape(extents[3], -1).astype(np.float64)
+        if known is not None and q.axis == 3:
+            even[:] = known
+    return nodes
 
 
 # ---------------------------------------------------------------- along time (section 8)
@@ -1058,7 +1156,9 @@ class Archive:
             self.length = f.tell()
             need(self.length >= 256 and self.length % ALIGN == 0, "file", f"cannot be {self.length} bytes long")
             self.data = mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ)
-        self._leaves: dict[int, list[Block]] = {}
+        self._leaves: dict[int, list[Block]] = {}  # the latest KEPT_LEAVES that were read
+        self._nodes: dict[int, tuple] = {}  # tier: the latest block above 0 that was decoded
+        self._first: dict[tuple, int] = {}  # window, tier, channel: number of the first leaf
         self._header()
         self._footer()
         f = self.footer
@@ -1066,6 +1166,7 @@ class Archive:
         self.metadata = Metadata.read(self._section(b"META", *place, place="metadata", cap=MAX_METADATA))
         for w in self.metadata.windows:
             need(self.nested or not (w.pyramid and w.pyramid.nested), "metadata", "nested parts are not announced")
+            need(self.tiered or not w.tiers, "metadata", "tiers are not announced")
         place = (f.root_offset, f.root_stored, f.root_raw, f.root_checksum)
         root = self._section(b"ROOT", *place, place="root", cap=MAX_ROOT_RAW)
         root = decompress(root, f.root_raw, "root", f.root_offset)
@@ -1082,11 +1183,12 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
         if head.major != 1:
             raise Unsupported("header", f"version {head.major}", 8)
-        if head.required > 3:
+        if head.required > 7:
             words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
             raise Unsupported("header", f"the file needs: {words}", 16)
         need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
-        self.id, self.nested, self.described = head.id, bool(head.required & 1), bool(head.required & 2)
+        self.id = head.id
+        self.nested, self.described, self.tiered = (bool(head.required & bit) for bit in (1, 2, 4))
 
     def _footer(self) -> None:
         """Checks the footer and the places of metadata and root."""
@@ -1110,8 +1212,9 @@ class Archive:
         need(f.blocks <= self.length // 128, "footer", "too many blocks", at + 72)
         need(f.leaves <= f.blocks and f.root_raw == LEAF.size * f.leaves, "footer", "bad count of leaves", at + 80)
 
-    def _seed(self, kind: int, window: int, block: int, channel: int, level: int = 0) -> int:
-        return xxhash.xxh3_64_intdigest(self.id + struct.pack("<IIHBB", window, block, channel, kind, level))
+    def _seed(self, kind: int, where: tuple[int, int, int, int], level: int = 0) -> int:
+        """`where`: window, block, channel, tier."""
+        return xxhash.xxh3_64_intdigest(self.id + struct.pack("<IIBBBB", *where, kind, level))
 
     def _bytes(self, offset: int, size: int, checksum: int, seed: int, place: str) -> bytes:
         need(offset + size <= self.length - 128, place, "is not within the file", offset)
@@ -1119,7 +1222,7 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(stored, seed) == checksum, place, "wrong checksum", offset)
         return stored
 
-    def _section(self, tag, offset, stored, raw, checksum, where=(0, 0, 0), place="", cap=None) -> bytes:
+    def _section(self, tag, offset, stored, raw, checksum, where=(0, 0, 0, 0), place="", cap=None) -> bytes:
         """The stored bytes of a section. `checksum` None: only its frame has it."""
         need(offset + FRAME.size <= self.length - 128, place, "is not within the file", offset)
         need(tag in (b"LEAF", b"ROOT", b"DESC") or stored == raw, place, "stored and raw differ", offset)
@@ -1127,7 +1230,7 @@ class Archive:
         frame = FRAME.read(self.data[offset : offset + FRAME.size])
         expected = (tag, stored, raw, 0, frame.checksum if checksum is None else checksum)
         need(frame == expected, place, "its frame is not the one that is expected", offset)
-        return self._bytes(offset + FRAME.size, stored, frame.checksum, self._seed(KIND[tag], *where), place)
+        return self._bytes(offset + FRAME.size, stored, frame.checksum, self._seed(KIND[tag], where), place)
 
     # ---- section 6
 
@@ -1146,26 +1249,28 @@ class Archive:
     def _places(self) -> None:
         """Checks that only padding separates window sections, blocks, leaves, window's ends and metadata."""
         m = self.metadata
-        per_channel = -(-m.blocks // BLOCKS_PER_LEAF)
-        runs = m.channels * len(m.windows)
-        need(self.footer.blocks == m.blocks * runs, "footer", "count of blocks does not fit the metadata")
-        need(len(self.leaves) == per_channel * runs, "footer", "count of leaves does not fit the metadata")
+        blocks = [m.blocks(tier) for w in m.windows for tier in range(w.tiers + 1)]
+        leaves = [-(-n // BLOCKS_PER_LEAF) for n in blocks]
+        need(self.footer.blocks == m.channels * sum(blocks), "footer", "count of blocks does not fit the metadata")
+        need(len(self.leaves) == m.channels * sum(leaves), "footer", "count of leaves does not fit the metadata")
         at = align(128 + FRAME.size + len(m.start))
-        leaves = iter(self.leaves)
-        for number in range(len(m.windows)):
-            at = align(at + FRAME.size + len(m.window_section(number)))
-            for channel in range(m.channels):
-                for first in range(0, m.blocks, BLOCKS_PER_LEAF):
-                    at = self._place(next(leaves), (number, channel, first), at)
-            at = align(at + FRAME.size + len(m.window_end(number)))
+        numbers = iter(range(len(self.leaves)))
+        for window in range(len(m.windows)):
+            at = align(at + FRAME.size + len(m.window_section(window)))
+            for tier, channel, first in m.runs(window):
+                number = next(numbers)
+                self._first.setdefault((window, tier, channel), number)
+                at = self._place(self.leaves[number], (window, tier, channel, first), at)
+            at = align(at + FRAME.size + len(m.window_end(window)))
         end = self.footer.metadata_offset
         need(at == end, "metadata", f"is not at byte {at}, where what is before ends", end)
 
     def _place(self, leaf, key: tuple, at: int) -> int:
         """Checks a leaf's entry, and returns the offset of the next section."""
         place = f"root, {name_of(leaf)}"
-        need((leaf.window, leaf.channel, leaf.first_block) == key, place, "leaves are not in order")
-        need(leaf.count == min(BLOCKS_PER_LEAF, self.metadata.blocks - leaf.first_block), place, "bad count of blocks")
+        need((leaf.window, leaf.tier, leaf.channel, leaf.first_block) == key, place, "leaves are not in order")
+        count = min(BLOCKS_PER_LEAF, self.metadata.blocks(leaf.tier) - leaf.first_block)
+        need(leaf.count == count, place, "bad count of blocks")
         need(leaf.data_offset == at, place, f"its blocks do not begin at byte {at}", leaf.data_offset)
         need(leaf.offset % ALIGN == 0 and leaf.offset >= at + 128 * leaf.count, place, "bad place", leaf.offset)
         least = BLOCK.size * leaf.count
@@ -1186,20 +1291,22 @@ class Archive:
 
     def leaf(self, number: int) -> list[Block]:
         """The entries of a leaf's blocks."""
-        if number not in self._leaves:
-            self._leaves = {number: self._read_leaf(self.leaves[number])}
-        return self._leaves[number]
+        blocks = self._leaves.pop(number, None) or self._read_leaf(self.leaves[number])
+        self._leaves[number] = blocks  # the last of the dictionary is the latest
+        if len(self._leaves) > KEPT_LEAVES:
+            del self._leaves[next(iter(self._leaves))]
+        return blocks
 
     def _read_leaf(self, leaf) -> list[Block]:
-        where, place = (leaf.window, leaf.first_block, leaf.channel), name_of(leaf)
+        where, place = (leaf.window, leaf.first_block, leaf.channel, leaf.tier), name_of(leaf)
         stored = self._section(b"LEAF", leaf.offset, leaf.stored, leaf.raw, leaf.checksum, where, place)
         r = Record(decompress(stored, leaf.raw, place, leaf.offset), place)
         blocks = [Block.read(r) for _ in range(leaf.count)]
         r.end()
         at = leaf.data_offset
         for i, b in enumerate(blocks):
-            key = (leaf.window, leaf.first_block + i, leaf.channel)
-            need((b.window, b.block, b.channel) == key, place, "blocks are not in order")
+            key = (leaf.window, leaf.first_block + i, leaf.channel, leaf.tier)
+            need(b.where == key, place, "blocks are not in order")
             check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize)
             part_at = at + FRAME.size + len(b.bytes)
             for p in b.parts:
@@ -1208,28 +1315,37 @@ class Archive:
             at = align(b.end(at))
         need(at == leaf.offset, place, "does not follow its blocks", leaf.offset)
         for name, value in sums(blocks).items():
-            need(getattr(leaf, name) == value, f"root, {place}", f"wrong {name}")
+            need(same(getattr(leaf, name), value), f"root, {place}", f"wrong {name}")
         return blocks
 
     def _size(self, b: Block) -> tuple[int, ...]:
-        return tuple(s.stop - s.start for s in self.metadata.box(b.block))
+        return tuple(s.stop - s.start for s in self.metadata.box(b.block, b.tier))
 
     # ---- samples
 
-    def block(self, window: int, channel: int, number: int) -> Block:
-        per_channel = -(-self.metadata.blocks // BLOCKS_PER_LEAF)
-        leaf = (window * self.metadata.channels + channel) * per_channel + number // BLOCKS_PER_LEAF
+    def block(self, window: int, tier: int, channel: int, number: int) -> Block:
+        leaf = self._first[window, tier, channel] + number // BLOCKS_PER_LEAF
         return self.leaf(leaf)[number % BLOCKS_PER_LEAF]
+
+    def above(self, b: Block) -> Block | None:
+        """The block above, if there is one."""
+        if b.tier == self.metadata.windows[b.window].tiers:
+            return None
+        return self.block(b.window, b.tier + 1, b.channel, self.metadata.above(b.block, b.tier))
+
+    def lost(self, b: Block | None) -> bool:
+        """Whether a block, or one above it, is lost."""
+        return b is not None and (bool(b.lost) or self.lost(self.above(b)))
 
     def payload(self, b: Block, p) -> bytes:
         """The content of a part after decompression."""
         place = f"{b.place}, part of kind {p.kind}, level {p.level}"
-        seed = self._seed(p.kind, b.window, b.block, b.channel, p.level)
+        seed = self._seed(p.kind, b.where, p.level)
         return decompress(self._bytes(p.offset, p.stored, p.checksum, seed, place), p.raw, place, p.offset)
 
     def samples(self, b: Block) -> np.ndarray:
-        """The samples of a block, [frame, z, y, x] (section 7)."""
-        need(not b.lost, b.place, "lost: its data were missing when the file was recovered")
+        """The samples of a block of tier 0, [frame, z, y, x] (section 7)."""
+        need(not self.lost(b), b.place, LOST)
         w, size, dtype = self.metadata.windows[b.window], self._size(b), self.metadata.dtype
         count = math.prod(size) * w.frames
         payloads = {(p.kind, p.level): (p, self.payload(b, p)) for p in b.parts}
@@ -1254,18 +1370,8 @@ class Archive:
         """c [k, voxel] as 64-bit floats (section 8)."""
         levels = {p.level: (p, data) for (kind, _), (p, data) in payloads.items() if kind == LEVEL}
         if w.pyramid:
-            extents, codes = (*size, w.coefficients), {}
-            for level, (p, data) in levels.items():
-                mine = [box for box in boxes(extents, w.pyramid) if box.part == level]
-                place = f"{b.place}, level {level}"
-                read = read_lattice(data, [box.counts for box in mine], w.pyramid.nested, p.count, place)
-                for box, found in zip(mine, read):
-                    even = tuple(slice(None, None, 2 if a in box.others else 1) for a in (2, 1, 0))
-                    need(not box.others or not found[(slice(None), *even)].any(), place, "a code of another box")
-                    whole = passes(extents, w.pyramid)[box.number].counts[::-1]
-                    of_pass = codes.setdefault(box.number, np.zeros(whole, np.int64))
-                    of_pass[(slice(None), *(slice(None, None, e) for e in box.steps[::-1]))] += found
-            return rebuild(codes, b.step, extents, w.pyramid)
+            own = self._lattice(b, w, levels)[(slice(None), *(slice(0, n) for n in size[::-1]))]
+            return own.reshape(w.coefficients, -1).astype(np.float64)
         voxels = math.prod(size)
         rows = []
         for level, count in enumerate(w.levels):
@@ -1276,12 +1382,49 @@ class Archive:
                 rows.append(np.zeros(count * voxels, np.int64))
         return np.concatenate(rows).astype(np.float64).reshape(-1, voxels) * b.step
 
+    def _lattice(self, b: Block, w: Window, levels: dict) -> np.ndarray:
+        """The nodes of a block [k, z, y, x], ghost nodes included."""
+        p, extents, codes = w.pyramid, (*self._size(b), w.coefficients), {}
+        for level, (part, data) in levels.items():
+            mine = [box for box in boxes(extents, p, b.tier) if box.part == level]
+            place = f"{b.place}, level {level}"
+            read = read_lattice(data, [box.counts for box in mine], p.nested, part.count, place)
+            for box, found in zip(mine, read):
+                even = tuple(slice(None, None, 2 if a in box.others else 1) for a in (2, 1, 0))
+                need(not box.others or not found[(slice(None), *even)].any(), place, "a code that is not of this box")
+                whole = passes(extents, p, b.tier)[box.number].counts[::-1]
+                of_pass = codes.setdefault(box.number, np.zeros(whole, np.int64))
+                of_pass[(slice(None), *(slice(None, None, e) for e in box.steps[::-1]))] += found
+        return rebuild(codes, b.step, extents, p, b.tier, self._known(b, p.lattice(extents, b.tier)))
+
+    def _known(self, b: Block, lattice: tuple[int, ...]) -> np.ndarray | None:
+        """The nodes of a block that are also those of the block above: those at even numbers."""
+        above = self.above(b)
+        if above is None:
+            return None
+        half = self.metadata.block_edge // 2  # of a block, on the lattice above
+        firsts = [n % 2 * half for n in self.metadata.position(b.block, b.tier)]
+        inside = [slice(f, f - (-n // 2)) for f, n in zip(firsts, lattice)]
+        return self.nodes(above)[(slice(None), *inside[::-1])]
+
+    def nodes(self, b: Block) -> np.ndarray:
+        """The nodes of a block of a tier above 0. The latest of each tier is kept for the blocks below it."""
+        key, nodes = self._nodes.get(b.tier, (None, None))
+        if key != b.where:
+            need(not b.lost, b.place, LOST)
+            levels = {p.level: (p, self.payload(b, p)) for p in b.parts}
+            with np.errstate(all="ignore"):
+                nodes = self._lattice(b, self.metadata.windows[b.window], levels)
+            self._nodes[b.tier] = (b.where, nodes)
+        return nodes
+
     def window(self, number: int, channel: int) -> np.ndarray:
         """All samples of a window and channel, [frame, z, y, x]."""
         m = self.metadata
         out = np.empty((m.windows[number].frames, *m.dims[::-1]), m.dtype)
-        for i in range(m.blocks):
-            out[(slice(None), *m.box(i)[::-1])] = self.samples(self.block(number, channel, i))
+        for tier, i in m.descent(number):
+            if tier == 0:
+                out[(slice(None), *m.box(i, 0)[::-1])] = self.samples(self.block(number, 0, channel, i))
         return out
 
     def extract(self, path: str) -> None:
@@ -1299,22 +1442,24 @@ class Archive:
     # ---- check
 
     def check(self, decode: bool = True) -> int:
-        """Reads everything in the order of the file; returns how many blocks are lost."""
+        """Reads everything in the order of the file, then decodes; returns how many blocks are lost."""
         m, f = self.metadata, self.footer
-        at = self._padding(self._repeats(b"STRT", 128, m.start, (0, 0, 0), "start"))
+        at = self._padding(self._repeats(b"STRT", 128, m.start, (0, 0, 0, 0), "start"))
         lost, leaves = 0, iter(range(len(self.leaves)))
         for number in range(len(m.windows)):
-            where = (number, 0, 0)
+            where = (number, 0, 0, 0)
             place = f"window section {number}"
             at = self._padding(self._repeats(b"WNDW", at, m.window_section(number), where, place))
-            for _ in range(len(self.leaves) // len(m.windows)):
+            for _ in m.runs(number):
                 i = next(leaves)
                 for b in self.leaf(i):
-                    at = self._check_block(b, at, decode)
+                    at = self._check_block(b, at)
                     lost += b.lost
                 at = self._padding(at + FRAME.size + self.leaves[i].stored)
             place = f"end of window {number}"
             at = self._padding(self._repeats(b"WEND", at, m.window_end(number), where, place))
+            if decode:
+                self._decode(number)
         self._padding(f.metadata_offset + FRAME.size + f.metadata_stored)
         if self.description() is not None:
             self._padding(f.description_offset + FRAME.size + f.description_stored)
@@ -1332,14 +1477,19 @@ class Archive:
         need(found == expected, place, "is not what leaf or metadata say", at)
         return at + FRAME.size + len(expected)
 
-    def _check_block(self, b: Block, at: int, decode: bool) -> int:
-        self._repeats(b"BLCK", at, b.bytes, (b.window, b.block, b.channel), f"header of {b.place}")
-        if decode and not b.lost:
-            self.samples(b)
-        else:
-            for p in b.parts:
-                self.payload(b, p)
+    def _check_block(self, b: Block, at: int) -> int:
+        self._repeats(b"BLCK", at, b.bytes, b.where, f"header of {b.place}")
+        for p in b.parts:
+            self.payload(b, p)
         return self._padding(b.end(at))
+
+    def _decode(self, window: int) -> None:
+        """Decodes the blocks of a window, except lost ones and those below them."""
+        for channel in range(self.metadata.channels):
+            for tier, number in self.metadata.descent(window):
+                b = self.block(window, tier, channel, number)
+                if not self.lost(b):
+                    (self.nodes if tier else self.samples)(b)
 
 
 # ---------------------------------------------------------------- command line

@@ -97,7 +97,7 @@ fn blocks(like: &[u8], blocks: u64, channels: u16) -> Vec<u8> {
     let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
     writer.begin_window(WindowRecord { number: 0, window, times: Vec::new() }).unwrap();
     for (channel, block) in (0..channels).flat_map(|channel| (0..blocks as u32).map(move |block| (channel, block))) {
-        let id = BlockId { window: 0, block, channel };
+        let id = BlockId::new(0, channel, block);
         let mut parts = vec![compressor.part(PartKind::Exact, stats, &vec![50; metadata.sample.size()]).unwrap()];
         parts.retain(|_| block % 8 == 0);
         let stats = BlockStats { step: 0.0, min: 50.0, max: 50.0, reached: 0.0, squared_error: 0.0, dropped: 0.0 };

@@ -17,7 +17,7 @@ fn description() -> Description {
 fn file(described: Option<&Description>) -> (Metadata, Vec<u8>) {
     let mut metadata = metadata();
     let blocks = blocks(&mut metadata, 7);
-    let features = Features { packing: metadata.packing(), described: described.is_some() };
+    let features = Features { described: described.is_some(), ..metadata.features() };
     let mut writer = Writer::with_features(Vec::new(), ID, &metadata, features).expect("memory");
     for window in 0..metadata.windows.len() as u32 {
         writer.begin_window(metadata.window_record(window)).expect("next");

@@ -45,6 +45,7 @@ fn every_field() -> Metadata {
         single: true,
         packing: Packing::Flat,
         ghosts: false,
+        tiers: 0,
     };
     let coded = Window { basis: Basis::Learned, coefficients: 3, ..metadata.windows[1].clone() };
     let functions = vec![1, -2, 3, -32768, 5, 32767];

@@ -21,7 +21,7 @@ fn files_round_trip() {
         );
     }
     assert!(reader.leaves(2).is_empty());
-    assert!(reader.entry(BlockId { window: 0, block: 12, channel: 0 }).is_err());
+    assert!(reader.entry(BlockId::new(0, 0, 12)).is_err());
 }
 
 #[test]
@@ -33,7 +33,7 @@ fn windows_of_several_leaves_round_trip() {
     let reader = Reader::open(&file).expect("whole");
     let counts: Vec<u16> = reader.leaves(1).iter().map(|leaf| leaf.count).collect();
     assert_eq!(counts, [512, 512, 176, 512, 512, 176]);
-    let id = BlockId { window: 1, block: 1199, channel: 1 };
+    let id = BlockId::new(1, 1, 1199);
     assert_eq!(reader.entry(id).expect("present").id, id);
     assert_eq!(verify(&file).expect("whole").len(), blocks.len());
 }
@@ -77,7 +77,7 @@ fn writers_refuse_impossible_statistics() {
     ];
     let (block, _) = blocks.iter().find(|(block, _)| block.parts.len() > 1).expect("one of several parts");
     for change in changes {
-        let mut block = EncodedBlock { id: BlockId { window: 0, block: 0, channel: 0 }, ..block.clone() };
+        let mut block = EncodedBlock { id: BlockId::new(0, 0, 0), ..block.clone() };
         change(&mut block);
         let mut writer = Writer::new(Vec::new(), ID, &metadata).expect("memory");
         assert!(matches!(writer.append(&block), Err(Error::Invalid(_))));

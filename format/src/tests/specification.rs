@@ -84,11 +84,11 @@ fn frames_and_entries_are_as_specified() {
     let (offset, stored_len, raw_len, checksum) = (12, 10, 11, 13);
     let part = PartEntry { kind: PartKind::Level(2), stats: part_stats, offset, stored_len, raw_len, checksum };
     let mut record = Vec::new();
-    BlockEntry { id: BlockId { window: 1, block: 2, channel: 3 }, stats, parts: vec![part], lost: true }
+    BlockEntry { id: BlockId { tier: 21, ..BlockId::new(1, 3, 2) }, stats, parts: vec![part], lost: true }
         .encode(&mut record);
     #[rustfmt::skip]
     check("Block entry", &record[..64], &[
-        ("window", &n4(1)), ("block", &n4(2)), ("channel", &[3, 0]), ("parts", &[1, 0]), ("lost", &n4(1)), ("step", &f8(4.0)),
+        ("window", &n4(1)), ("block", &n4(2)), ("channel", &[3]), ("tier", &[21]), ("parts", &[1, 0]), ("lost", &n4(1)), ("step", &f8(4.0)),
         ("min", &f8(5.0)), ("max", &f8(6.0)), ("reached", &f8(7.0)), ("squared error", &f8(8.0)), ("dropped", &f8(9.0)),
     ]);
     #[rustfmt::skip]
@@ -102,7 +102,7 @@ fn frames_and_entries_are_as_specified() {
 fn leaf_entries_are_as_specified() {
     #[rustfmt::skip]
     let leaf = LeafEntry {
-        window: 1, first_block: 2, channel: 3, count: 4, stored_len: 5, raw_len: 6, exact: 7, data_offset: 8, offset: 9,
+        window: 1, first_block: 2, channel: 3, tier: 21, count: 4, stored_len: 5, raw_len: 6, exact: 7, data_offset: 8, offset: 9,
         checksum: 10, min: 11.0, max: 12.0, reached: 13.0, squared_error: 14.0, energy: 15.0, dropped: 16.0, coded: 17,
         outliers: 18, missing: 19, lost: 20,
     };
@@ -112,7 +112,7 @@ fn leaf_entries_are_as_specified() {
     let (n8, n4, f8) = (|n: u64| n.to_le_bytes(), |n: u32| n.to_le_bytes(), |n: f64| n.to_le_bytes());
     #[rustfmt::skip]
     check("Leaf entry", &record, &[
-        ("window", &n4(1)), ("first block", &n4(2)), ("channel", &[3, 0]), ("count", &[4, 0]), ("stored", &n4(5)),
+        ("window", &n4(1)), ("first block", &n4(2)), ("channel", &[3]), ("tier", &[21]), ("count", &[4, 0]), ("stored", &n4(5)),
         ("raw", &n4(6)), ("exact", &n4(7)), ("data offset", &n8(8)), ("offset", &n8(9)), ("checksum", &n8(10)),
         ("min", &f8(11.0)), ("max", &f8(12.0)), ("reached", &f8(13.0)), ("squared error", &f8(14.0)),
         ("energy", &f8(15.0)), ("dropped", &f8(16.0)), ("coded", &n8(17)), ("outliers", &n8(18)), ("missing", &n8(19)), ("lost", &n8(20)),
@@ -127,7 +127,7 @@ fn limits_are_as_specified() {
         ("ALIGN", ALIGN), ("BLOCKS_PER_LEAF", BLOCKS_PER_LEAF.into()), ("MAX_BLOCK_SAMPLES", MAX_BLOCK_SAMPLES),
         ("MAX_PART_RAW", MAX_PART_RAW), ("MAX_LEVELS", MAX_LEVELS as u64), ("MAX_PARTS", MAX_PARTS as u64),
         ("MAX_WINDOW_FRAMES", MAX_WINDOW_FRAMES.into()), ("MAX_COEFFICIENTS", MAX_COEFFICIENTS.into()),
-        ("MAX_DIM", MAX_DIM), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
+        ("MAX_DIM", MAX_DIM), ("MAX_CHANNELS", MAX_CHANNELS.into()), ("MAX_TIERS", MAX_TIERS.into()), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
         ("MAX_ROOT_RAW", MAX_ROOT_RAW), ("MAX_DESCRIPTION", MAX_DESCRIPTION as u64),
         ("MAX_DESCRIPTION_ITEMS", MAX_DESCRIPTION_ITEMS as u64),
     ];
@@ -152,7 +152,7 @@ fn the_dump_is_a_file() {
     let levels = vec![vec![3, -2], vec![0, 0], vec![0, 0, 300, 0]];
     let outliers = Outliers { positions: vec![5], samples: vec![2, 1] };
     let content = Content { levels, outliers, ..Content::default() };
-    let id = BlockId { window: 0, block: 0, channel: 0 };
+    let id = BlockId::new(0, 0, 0);
     let block = encode(id, &content, &metadata.geometry(id).expect("there"), &mut Compressor::new(3).expect("level 3"));
     (metadata.windows[0].coded, metadata.windows[0].outliers) = (3, 1);
     let file = file(&metadata, &[(block, content.clone())]);

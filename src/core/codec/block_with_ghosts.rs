@@ -42,24 +42,38 @@ impl BlockWithGhosts {
         let mut extended = Cow::Borrowed(samples);
         for axis in 0..3 {
             if known[axis] < outer[axis] {
-                extended = Cow::Owned(continued(codec, &extended, known, axis));
+                extended = Cow::Owned(continued(codec, &extended, known, axis, known[axis]));
                 known[axis] += 1;
             }
         }
         extended
     }
+
+    /// The nodes of a block of a tier above 0, from what is known: those in the volume and, along axes that have a node behind it,
+    /// the volume's last two planes of voxels. Those are extrapolated as for the blocks below.
+    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Cow<'a, [u8]> {
+        let mut known = self.known;
+        let mut nodes = Cow::Borrowed(samples);
+        for axis in 0..3 {
+            if known[axis] > self.size[axis] {
+                nodes = Cow::Owned(continued(codec, &nodes, known, axis, known[axis] - 2));
+                known[axis] -= 1;
+            }
+        }
+        nodes
+    }
 }
 
 /// Extrapolates one more plane of samples along an axis: twice the last plane minus the one before it. Where one of the
-/// two samples is missing, it repeats the last.
-fn continued(codec: &WindowCodec, samples: &[u8], known: [usize; 3], axis: usize) -> Vec<u8> {
+/// two samples is missing, it repeats the last. Keeps the first planes before it.
+fn continued(codec: &WindowCodec, samples: &[u8], known: [usize; 3], axis: usize, kept: usize) -> Vec<u8> {
     let (ty, each) = (codec.sample, codec.sample.size());
     let inner: usize = known[..axis].iter().product();
     let (plane, n) = (inner * each, known[axis]);
     let (mut last, mut before) = (vec![0.0; inner], vec![0.0; inner]);
     let mut out = Vec::with_capacity(samples.len() / n * (n + 1));
     for part in samples.chunks_exact(plane * n) {
-        out.extend_from_slice(part);
+        out.extend_from_slice(&part[..plane * kept]);
         sample::load(ty, &part[plane * (n - 1)..], &mut last);
         sample::load(ty, &part[plane * n.saturating_sub(2)..][..plane], &mut before);
         for (last, before) in last.iter_mut().zip(&before) {

@@ -7,7 +7,7 @@ use super::WindowCodec;
 use super::decode::Block;
 use crate::base::sample;
 use crate::wavelet;
-use wavesplat_format::{BlockEntry, Reader, Result, Storage};
+use wavesplat_format::BlockEntry;
 
 /// The coarsest level of detail that is used. Its nodes are exactly those of the first level part, so a coarser one
 /// would save no bytes.
@@ -18,17 +18,17 @@ pub fn level_of(stride: usize) -> u32 {
     stride.trailing_zeros().min(COARSEST)
 }
 
-/// Decodes every `stride`-th voxel along each axis of a block, in some frames of the window: frame after frame, x
+/// Every `stride`-th voxel along each axis of a block of `size` voxels, in some frames of the window: frame after frame, x
 /// fastest; NaN where a sample is missing, or where the block is lost. The codec must have the level of detail of
-/// [`level_of`], or a finer one.
-pub fn thinned<S: Storage>(
-    reader: &Reader<S>,
+/// [`level_of`], or a finer one. `read` reads the coefficients of the block that it is told to.
+pub fn thinned<E>(
     codec: &WindowCodec,
     entry: &BlockEntry,
     size: [usize; 3],
     stride: usize,
     frames: &[usize],
-) -> Result<Vec<f32>> {
+    read: impl FnOnce(&[bool]) -> Result<Block, E>,
+) -> Result<Vec<f32>, E> {
     let [x, y, z] = codec.decoded_size(size);
     let step = stride >> codec.lod;
     let along = |n: usize| (0..n).step_by(step);
@@ -37,7 +37,7 @@ pub fn thinned<S: Storage>(
     if entry.lost {
         return Ok(vec![f32::NAN; frames.len() * taken.len()]);
     }
-    let block = Block::read(reader, codec, entry, size, &wavelet::needed(&codec.synthesis, frames))?;
+    let block = read(&wavelet::needed(&codec.synthesis, frames))?;
     let (bytes, each) = (block.samples(codec), codec.sample.size());
     let mut values = vec![0.0; block.voxels];
     let mut samples = Vec::with_capacity(frames.len() * taken.len());

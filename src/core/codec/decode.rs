@@ -7,11 +7,11 @@
 use super::WindowCodec;
 use super::buffer::Buffer;
 use super::codes::Codes;
-use super::field::{Field, Plane};
+use super::field::{Above, Field, Plane, Stored};
 use super::rows::Change;
 use crate::base::sample::{self, SampleType};
 use std::collections::HashMap;
-use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
+use wavesplat_format::{Axis, Basis, BlockEntry, EncodedBlock, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -26,6 +26,8 @@ pub struct Block {
     pub step: f64,
     /// The codes of the level parts that were read.
     pub codes: Codes,
+    /// The block above, if the codes need it.
+    pub above: Option<Above>,
     /// Samples stored exactly because their decoded values miss the bound.
     pub outliers: Outliers,
     /// Which samples are missing (`frame * voxels + voxel`), and the bytes of those in order; empty if none is missing.
@@ -37,13 +39,15 @@ pub struct Block {
 }
 
 impl Block {
-    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples.
+    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples. `above` is
+    /// the block above, if the window has tiers.
     pub fn read<S: Storage>(
         reader: &Reader<S>,
         codec: &WindowCodec,
         entry: &BlockEntry,
         of: [usize; 3],
         wanted: &[bool],
+        above: Option<Above>,
     ) -> Result<Self> {
         let size = codec.decoded_size(of);
         let mut block = Self {
@@ -52,6 +56,7 @@ impl Block {
             of,
             step: entry.stats.step,
             codes: Codes::default(),
+            above,
             outliers: reader.outliers(entry)?,
             missing: reader.missing(entry)?.unwrap_or_default(),
             exact: reader.exact(entry)?,
@@ -61,6 +66,23 @@ impl Block {
         block.read_codes(reader, codec, entry, wanted)?;
         block.bytes_read += entry.parts.iter().filter(|p| !is_level(p)).map(|p| u64::from(p.stored_len)).sum::<u64>();
         Ok(block)
+    }
+
+    /// A block of `of` voxels as it will be stored, of a tier above 0.
+    ///
+    /// # Errors
+    /// Its parts cannot be unpacked.
+    pub fn from_encoded(
+        codec: &WindowCodec,
+        encoded: &EncodedBlock,
+        of: [usize; 3],
+        above: Option<Above>,
+    ) -> Result<Self> {
+        let none =
+            Self { missing: Default::default(), step: encoded.stats.step, above, ..Self::missing(codec, [1; 3]) };
+        let Some(pyramid) = &codec.scheme.pyramid else { return Ok(Self { of, ..none }) };
+        let codes = Codes::Sparse(codec.passes(pyramid, of).unpack(encoded)?);
+        Ok(Self { of, codes, ..none })
     }
 
     /// The parts that [`Self::read`] reads.
@@ -91,7 +113,18 @@ impl Block {
         let mut bytes = vec![0; samples * codec.sample.size()];
         sample::store(codec.sample, &vec![number; samples], &mut bytes);
         let (outliers, missing) = (Outliers::default(), (vec![true; samples], bytes));
-        Self { size, voxels, of, step: 0.0, codes: Codes::default(), outliers, missing, exact: None, bytes_read: 0 }
+        Self {
+            size,
+            voxels,
+            of,
+            step: 0.0,
+            codes: Codes::default(),
+            above: None,
+            outliers,
+            missing,
+            exact: None,
+            bytes_read: 0,
+        }
     }
 
     /// Reads the level parts that exist and that `wanted` needs; the codes of others are zero.
@@ -198,9 +231,13 @@ impl Block {
         };
     }
 
+    fn stored(&self) -> Stored<'_> {
+        Stored { size: self.of, step: self.step, codes: &self.codes, above: self.above.as_ref() }
+    }
+
     /// Decodes the codes to coefficients.
     pub fn field(&self, codec: &WindowCodec) -> Field<'_> {
-        Field::decode(codec, self.of, self.step, &self.codes)
+        Field::decode(codec, self.stored())
     }
 
     /// Decodes every k that `wanted` marks of a pyramid, if that is needed at once: because one k cannot be decoded
@@ -208,7 +245,12 @@ impl Block {
     pub fn field_at_once(&self, codec: &WindowCodec, wanted: &[bool]) -> Option<Field<'static>> {
         let pyramid = codec.scheme.pyramid.as_ref()?;
         let at_once = pyramid.order.contains(&Axis::T) || self.overrides();
-        at_once.then(|| Field::refined(codec, self.of, self.step, self.codes.sparse(), wanted))
+        at_once.then(|| self.refined(codec, wanted))
+    }
+
+    /// Decodes every k that `wanted` marks of a block that a pyramid refines.
+    pub fn refined(&self, codec: &WindowCodec, wanted: &[bool]) -> Field<'static> {
+        Field::refined(codec, self.of, self.step, self.codes.sparse(), self.above.as_ref(), wanted)
     }
 
     /// Bytes of memory that the block takes.
@@ -231,7 +273,7 @@ impl Block {
         single: &'a mut Vec<f32>,
         double: &'a mut Vec<f64>,
     ) -> Plane<'a> {
-        Plane::decode(codec, self.of, self.step, &self.codes, k, single, double)
+        Plane::decode(codec, self.stored(), k, single, double)
     }
 
     /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the
@@ -243,7 +285,11 @@ impl Block {
             return (0..codec.parts() as u8).map(of_level).collect();
         };
         let passes = codec.passes(pyramid, self.of);
-        self.field(codec).changes(&passes, self.step, self.codes.sparse()).iter().map(Change::largest).collect()
+        self.field(codec)
+            .changes(&passes, self.step, self.codes.sparse(), self.above.as_ref())
+            .iter()
+            .map(Change::largest)
+            .collect()
     }
 
     /// Whether a sample is missing.

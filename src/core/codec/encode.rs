@@ -14,7 +14,9 @@
 use super::block_with_ghosts::BlockWithGhosts;
 use super::buffer::clear;
 use super::check::Tally;
+use super::codes::Codes;
 use super::error_weights::QuantizerSetup;
+use super::field::{Above, Field};
 use super::load::{Missing, load_group};
 use super::refine::{Coded, Source};
 use super::truncate::Group;
@@ -50,13 +52,14 @@ impl Encoder {
         Ok(Self { compressor: Compressor::new(level)?, codes, single, double, raw })
     }
 
-    /// Encodes a block of some voxels. `samples` are little-endian, frame by frame.
+    /// Encodes a block of some voxels. `samples` are little-endian, frame by frame; `above` is the block above, if there are tiers.
     pub fn block(
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
         of: impl Into<BlockWithGhosts>,
         samples: &[u8],
+        above: Option<&Above>,
     ) -> wavesplat_format::Result<Encoded> {
         let of: BlockWithGhosts = of.into();
         let (size, around) = (of.size, codec.outer_size(of.size));
@@ -71,15 +74,15 @@ impl Encoder {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
                 self.double = Default::default(); // an earlier window may have used it
-                block.refine(pyramid, &outer, &mut self.single, &mut self.codes)
+                block.refine(pyramid, size, &outer, above.map(Above::singles), &mut self.single, &mut self.codes)
             }
             Some(pyramid) => {
                 self.single = Default::default();
-                block.refine(pyramid, &outer, &mut self.double, &mut self.codes)
+                block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut self.double, &mut self.codes)
             }
         };
         let coded = match coded {
-            Some(coded) => self.coded_parts(&block, &coded)?,
+            Some(coded) => self.coded_parts(codec, size, &coded)?,
             None => self.exact_parts(codec, samples, &missing)?,
         };
         let Parts { stats, share, mut parts } = self.smaller(codec, samples, &missing, coded)?;
@@ -90,6 +93,53 @@ impl Encoder {
             parts.sort_by_key(|part| part.kind); // exact parts come after it
         }
         Ok(Encoded { block: EncodedBlock { id, stats, parts }, share })
+    }
+
+    /// Encodes a block of a tier above 0 that covers `size` voxels, and returns its decoded nodes for the blocks below. `of` are its
+    /// nodes, and `samples` those that [`BlockWithGhosts::coarse`] makes them from.
+    pub fn coarse(
+        &mut self,
+        codec: &WindowCodec,
+        id: BlockId,
+        size: [usize; 3],
+        of: BlockWithGhosts,
+        samples: &[u8],
+        above: Option<&Above>,
+    ) -> wavesplat_format::Result<(EncodedBlock, Field<'static>)> {
+        let samples = of.coarse(codec, samples);
+        let missing = Missing::find(codec, &samples);
+        let source = Source { codec, size: of.size, samples: &samples, missing: &missing };
+        let ks = codec.basis.coefficients();
+        let (coded, field) = match &codec.scheme.pyramid {
+            Some(pyramid) if pyramid.single => {
+                let known = above.map(Above::singles);
+                let coded = source.refine(pyramid, size, &source, known, &mut self.single, &mut self.codes);
+                (coded, Field::coarse(Some(&self.single[1]), &[], ks))
+            }
+            Some(pyramid) => {
+                let known = above.map(Above::doubles);
+                let coded = source.refine(pyramid, size, &source, known, &mut self.double, &mut self.codes);
+                (coded, Field::coarse(None, &self.double[1], ks))
+            }
+            None => (None, Field::coarse(None, &[], ks)),
+        };
+        let Some(coded) = coded else { return Ok(self.uncoded(codec, id, size, above)) };
+        let Parts { stats, parts, .. } = self.coded_parts(codec, size, &coded)?;
+        Ok((EncodedBlock { id, stats, parts }, field))
+    }
+
+    /// A block of a tier above 0 without codes.
+    fn uncoded(
+        &self,
+        codec: &WindowCodec,
+        id: BlockId,
+        size: [usize; 3],
+        above: Option<&Above>,
+    ) -> (EncodedBlock, Field<'static>) {
+        let Parts { stats, parts, .. } = Parts::new(&Tally::new(), 0.0, 0.0, Vec::new());
+        let wanted = vec![true; codec.basis.coefficients()];
+        let field = Field::refined(codec, size, 0.0, Codes::default().sparse(), above, &wanted);
+        (EncodedBlock { id, stats, parts }, field)
     }
 
     /// Encodes every series by itself. None if the block must be stored exactly.
@@ -128,10 +178,9 @@ impl Encoder {
     }
 
     /// The parts of a block coded by coefficients.
-    fn coded_parts(&mut self, block: &Source<'_>, coded: &Coded) -> wavesplat_format::Result<Parts> {
-        let codec = block.codec;
+    fn coded_parts(&mut self, codec: &WindowCodec, size: [usize; 3], coded: &Coded) -> wavesplat_format::Result<Parts> {
         let pyramid = codec.scheme.pyramid.as_ref();
-        let passes = pyramid.map(|p| (p.packing, codec.passes(p, block.size)));
+        let passes = pyramid.map(|p| (p.packing, codec.passes(p, size)));
         let mut parts = Vec::new();
         for level in 0..codec.parts() as u8 {
             clear(&mut self.raw);
@@ -141,7 +190,7 @@ impl Encoder {
                     parts[usize::from(level)]
                 }
                 _ => {
-                    let codes = &self.codes[codec.level_range(level, block.size)];
+                    let codes = &self.codes[codec.level_range(level, size)];
                     pack_codes(codes, &mut self.raw);
                     code_stats(codes, coded.step)
                 }

@@ -3,11 +3,12 @@
 use super::WindowCodec;
 use super::buffer::Buffer;
 use super::codes::Codes;
-use super::pyramid::PredictionPasses;
+use super::pyramid::{Known, Nodes, PredictionPasses};
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
+use std::sync::Arc;
 use wavesplat_format::{Pyramid, SparseCodes};
 
 /// The decoded coefficients of a block.
@@ -36,6 +37,43 @@ enum Values<'a> {
     Double(Buffer<f64>),
 }
 
+/// The decoded block above, and where a block lies in it.
+#[derive(Debug, Clone)]
+pub struct Above {
+    /// The nodes of the block above.
+    pub field: Arc<Field<'static>>,
+    /// The number of these nodes along x, y, z.
+    pub size: [usize; 3],
+    /// The first of them that lies in the block.
+    pub start: [usize; 3],
+}
+
+impl Above {
+    /// The known nodes of a block that is coded in 32-bit floats.
+    pub(super) fn singles(&self) -> Known<'_, f32> {
+        self.known(self.field.singles())
+    }
+
+    /// The known nodes of a block that is coded in 64-bit floats.
+    pub(super) fn doubles(&self) -> Known<'_, f64> {
+        self.known(self.field.doubles())
+    }
+
+    fn known<'a, R>(&self, values: Option<&'a [R]>) -> Known<'a, R> {
+        Known { nodes: Nodes { values: values.unwrap_or_default(), size: self.size }, start: self.start }
+    }
+}
+
+/// What a block's coefficients are decoded from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stored<'a> {
+    /// The voxels that the block covers along x, y, z.
+    pub(super) size: [usize; 3],
+    pub(super) step: f64,
+    pub(super) codes: &'a Codes,
+    pub(super) above: Option<&'a Above>,
+}
+
 /// The coefficients of one k of a block, x fastest.
 #[derive(Debug, Clone, Copy)]
 pub enum Plane<'a> {
@@ -51,22 +89,45 @@ impl<'a> Plane<'a> {
     /// Decodes one k of a block. Each k must be coded by itself.
     pub(super) fn decode(
         codec: &WindowCodec,
-        size: [usize; 3],
-        step: f64,
-        codes: &Codes,
+        of: Stored<'_>,
         k: usize,
         single: &'a mut Vec<f32>,
         double: &'a mut Vec<f64>,
     ) -> Self {
+        let Stored { size, step, codes, above } = of;
         let Some(pyramid) = &codec.scheme.pyramid else {
             let voxels: usize = codec.decoded_size(size).iter().product();
             return Self::scaled(step, codes.dense().get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
         };
+        if codec.is_all_above() {
+            let size = codec.decoded_size(size);
+            return above.map_or(Self::Zero, |above| Self::copied(above, pyramid.single, size, k, single, double));
+        }
         let (passes, codes) = (codec.passes(pyramid, size), codes.sparse());
         match pyramid.single {
-            true if passes.decode_one(k, step, codes, single) => Self::Single(single),
-            false if passes.decode_one(k, step, codes, double) => Self::Double(double),
+            true if passes.decode_one(k, step, codes, above.map(Above::singles), single) => Self::Single(single),
+            false if passes.decode_one(k, step, codes, above.map(Above::doubles), double) => Self::Double(double),
             _ => Self::Zero,
+        }
+    }
+
+    /// The nodes of one k that the block above has.
+    fn copied(
+        above: &Above,
+        is_single: bool,
+        size: [usize; 3],
+        k: usize,
+        single: &'a mut Vec<f32>,
+        double: &'a mut Vec<f64>,
+    ) -> Self {
+        fn copy<'a, R: Real>(known: Known<'_, R>, size: [usize; 3], k: usize, out: &'a mut Vec<R>) -> &'a [R] {
+            out.resize(size.iter().product(), R::default());
+            known.copy(size, k..k + 1, out);
+            out
+        }
+        match is_single {
+            true => Self::Single(copy(above.singles(), size, k, single)),
+            false => Self::Double(copy(above.doubles(), size, k, double)),
         }
     }
 
@@ -87,16 +148,25 @@ impl Field<'static> {
         size: [usize; 3],
         step: f64,
         codes: &SparseCodes,
+        above: Option<&Above>,
         wanted: &[bool],
     ) -> Self {
+        let of = Refined { codec, size, step, codes, wanted };
         let (values, marked) = match &codec.scheme.pyramid {
-            Some(pyramid) if pyramid.single => {
-                refined(&codec.passes(pyramid, size), step, codes, wanted, Values::Single)
-            }
-            Some(pyramid) => refined(&codec.passes(pyramid, size), step, codes, wanted, Values::Double),
+            Some(pyramid) if pyramid.single => of.values(pyramid, above.map(Above::singles), Values::Single),
+            Some(pyramid) => of.values(pyramid, above.map(Above::doubles), Values::Double),
             None => (Values::Zero, vec![false; codec.basis.coefficients()]),
         };
         Self { values, marked }
+    }
+
+    /// The decoded nodes of a block of a tier above 0, as its encoder has them.
+    pub(super) fn coarse(single: Option<&[f32]>, double: &[f64], ks: usize) -> Self {
+        let values = match single {
+            Some(values) => Values::Single(values.iter().copied().collect()),
+            None => Values::Double(double.iter().copied().collect()),
+        };
+        Self { values, marked: vec![true; ks] }
     }
 }
 
@@ -113,13 +183,14 @@ impl Field<'_> {
 
 impl<'a> Field<'a> {
     /// Decodes all codes of a block. Without codes, all coefficients are zero.
-    pub(super) fn decode(codec: &WindowCodec, size: [usize; 3], step: f64, codes: &'a Codes) -> Self {
+    pub(super) fn decode(codec: &WindowCodec, of: Stored<'a>) -> Self {
+        let Stored { size, step, codes, above } = of;
         match codes {
             Codes::Dense(codes) if !codes.is_empty() => {
                 let marked = vec![true; codec.basis.coefficients()];
                 Self { values: Values::Codes { step, codes }, marked }
             }
-            _ => Field::refined(codec, size, step, codes.sparse(), &vec![true; codec.basis.coefficients()]),
+            _ => Field::refined(codec, size, step, codes.sparse(), above, &vec![true; codec.basis.coefficients()]),
         }
     }
 
@@ -138,11 +209,22 @@ impl<'a> Field<'a> {
         if let Values::Single(values) = &self.values { Some(values) } else { None }
     }
 
+    /// All coefficients, if a pyramid decoded them in 64-bit floats.
+    pub(super) fn doubles(&self) -> Option<&[f64]> {
+        if let Values::Double(values) = &self.values { Some(values) } else { None }
+    }
+
     /// The change from leaving out each level part of a pyramid and all finer ones.
-    pub(super) fn changes(&self, passes: &PredictionPasses<'_>, step: f64, codes: &SparseCodes) -> Vec<Change> {
+    pub(super) fn changes(
+        &self,
+        passes: &PredictionPasses<'_>,
+        step: f64,
+        codes: &SparseCodes,
+        above: Option<&Above>,
+    ) -> Vec<Change> {
         match &self.values {
-            Values::Single(field) => passes.changes(step, codes, field),
-            Values::Double(field) => passes.changes(step, codes, field),
+            Values::Single(field) => passes.changes(step, codes, above.map(Above::singles), field),
+            Values::Double(field) => passes.changes(step, codes, above.map(Above::doubles), field),
             Values::Zero | Values::Codes { .. } => vec![Change::default(); usize::from(Pyramid::PARTS)],
         }
     }
@@ -275,17 +357,36 @@ fn widen(values: &[f32], out: &mut [f64]) {
     out.iter_mut().zip(values).for_each(|(v, c)| *v = f64::from(*c));
 }
 
-fn refined<'a, R: Real>(
-    passes: &PredictionPasses<'_>,
+/// Codes of a block to decode by a pyramid.
+struct Refined<'a> {
+    codec: &'a WindowCodec,
+    size: [usize; 3],
     step: f64,
-    codes: &SparseCodes,
-    wanted: &[bool],
-    values: fn(Buffer<R>) -> Values<'a>,
-) -> (Values<'a>, Vec<bool>) {
-    if codes.count() == 0 {
-        return (Values::Zero, vec![false; passes.nodes()[3]]);
+    codes: &'a SparseCodes,
+    wanted: &'a [bool],
+}
+
+impl Refined<'_> {
+    /// The coefficients of every k that is wanted, and for each k whether some are not zero.
+    fn values<'v, R: Real>(
+        &self,
+        pyramid: &Pyramid,
+        known: Option<Known<'_, R>>,
+        values: fn(Buffer<R>) -> Values<'v>,
+    ) -> (Values<'v>, Vec<bool>) {
+        let &Self { codec, size, step, codes, wanted } = self;
+        let (ks, nodes) = (codec.basis.coefficients(), codec.decoded_size(size));
+        if codes.count() == 0 && known.is_none() {
+            return (Values::Zero, vec![false; ks]);
+        }
+        let mut field = Buffer::with_len(nodes.iter().product::<usize>() * ks);
+        match known.filter(|_| codec.is_all_above()) {
+            Some(known) => known.copy(nodes, 0..ks, &mut field),
+            None => {
+                let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
+                return (values(field), marked);
+            }
+        }
+        (values(field), vec![true; ks])
     }
-    let mut field = Buffer::with_len(passes.nodes().iter().product());
-    let marked = passes.decode_some(wanted, step, codes, &mut field);
-    (values(field), marked)
 }

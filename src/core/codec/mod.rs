@@ -34,17 +34,18 @@ use crate::wavelet::{self, LANES, TimeBasis};
 use pyramid::PredictionPasses;
 use scheme::Scheme;
 use std::ops::Range;
+use std::sync::Arc;
 use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 
 /// What coding and decoding share for all blocks of one window.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct WindowCodec {
     /// How blocks are coded.
     pub scheme: Scheme,
     /// The temporal basis.
-    pub basis: Box<dyn TimeBasis>,
+    pub basis: Arc<dyn TimeBasis>,
     /// The basis functions: `synthesis[k][t]` is u_k(t).
-    pub synthesis: Vec<Vec<f64>>,
+    pub synthesis: Arc<Vec<Vec<f64>>>,
     /// The largest sum over k of |u_k(t)| (eq 25).
     pub gain: f64,
     /// The type of the samples.
@@ -59,6 +60,8 @@ pub struct WindowCodec {
     pub levels: Vec<Range<usize>>,
     /// The level of detail: blocks are decoded on the lattice of every 2^lod-th voxel along each axis.
     pub lod: u32,
+    /// The tier of the blocks that are coded or decoded.
+    pub tier: u8,
 }
 
 impl WindowCodec {
@@ -79,7 +82,8 @@ impl WindowCodec {
         let synthesis = wavelet::synthesis(basis.as_ref());
         let gain = wavelet::gain(&synthesis);
         let levels = wavelet::ranges(levels);
-        Self { scheme, basis, synthesis, gain, sample, bound, missing_value: None, clip: None, levels, lod: 0 }
+        let (basis, synthesis) = (Arc::from(basis), Arc::new(synthesis));
+        Self { scheme, basis, synthesis, gain, sample, bound, missing_value: None, clip: None, levels, lod: 0, tier: 0 }
     }
 
     /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.
@@ -107,6 +111,7 @@ impl WindowCodec {
     pub fn needs_part(&self, part: usize, wanted: &[bool]) -> bool {
         match &self.scheme.pyramid {
             None => wanted[self.levels[part].clone()].contains(&true),
+            Some(_) if self.is_all_above() => false,
             Some(pyramid) if part > coarsest_part(pyramid, self.lod) => false,
             // The last pass, along time, adds only the odd frames.
             Some(_) if part == ODD_FRAMES => wanted.iter().skip(1).step_by(2).any(|w| *w),
@@ -114,9 +119,25 @@ impl WindowCodec {
         }
     }
 
-    /// The voxels of a block that are decoded.
-    pub(crate) fn decoded_size(&self, size: [usize; 3]) -> [usize; 3] {
-        size.map(|n| n.div_ceil(1 << self.lod))
+    /// The nodes of a block of `size` voxels that are decoded.
+    pub fn decoded_size(&self, size: [usize; 3]) -> [usize; 3] {
+        let nodes = self.scheme.pyramid.as_ref().map_or(size, |pyramid| pyramid.nodes(size, self.tier));
+        nodes.map(|n| n.div_ceil(1 << self.lod))
+    }
+
+    /// The codec of a tier's blocks at a level of detail of their lattice.
+    pub fn at(&self, tier: u8, lod: u32) -> Self {
+        Self { tier, lod, ..self.clone() }
+    }
+
+    /// The number of tiers above the blocks.
+    pub fn tiers(&self) -> u8 {
+        self.scheme.pyramid.as_ref().map_or(0, |pyramid| pyramid.tiers)
+    }
+
+    /// Whether blocks are decoded from those above them alone, because the level of detail leaves out their own nodes.
+    pub(crate) fn is_all_above(&self) -> bool {
+        self.tier == 0 && self.lod > 0 && self.tiers() > 0
     }
 
     /// The voxels along x, y, z that are needed to code a block: its own, and the ones of following blocks that predict
@@ -128,7 +149,7 @@ impl WindowCodec {
 
     /// The passes that decode a block at the codec's level of detail.
     pub(crate) fn passes<'a>(&self, pyramid: &'a Pyramid, size: [usize; 3]) -> PredictionPasses<'a> {
-        PredictionPasses::with_detail(pyramid, size, self.basis.coefficients(), self.lod)
+        PredictionPasses::with_detail(pyramid, size, self.basis.coefficients(), self.tier, self.lod)
     }
 
     /// Without a pyramid: the range of codes in a level part of a block of `size` voxels.

@@ -10,7 +10,7 @@ use super::codes::PooledCodes;
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::load::{Missing, load_group};
-use super::pyramid::PredictionPasses;
+use super::pyramid::{Known, Nodes, PredictionPasses};
 use super::real::Real;
 use super::rows::Change;
 use super::truncate::Group;
@@ -33,13 +33,20 @@ pub(super) struct Coded {
 /// The codes of a block that are not zero, and how the field that they give compares with the source.
 struct Checked {
     listed: PooledCodes,
-    tally: Tally,
+    /// None if too many samples miss the bound.
+    tally: Option<Tally>,
 }
 
 impl Checked {
+    /// An estimate of the bytes, in those of a code.
+    fn cost(&self) -> usize {
+        let outliers = self.tally.as_ref().map_or(usize::MAX, |tally| tally.outliers.len());
+        self.listed.count().saturating_add(outliers.saturating_mul(CODES_PER_OUTLIER))
+    }
+
     /// Whether outliers take a large share of the bytes.
     fn has_many_outliers(&self) -> bool {
-        self.tally.outliers.len() * CODES_PER_OUTLIER > self.listed.count()
+        self.tally.as_ref().is_none_or(|tally| tally.outliers.len() * CODES_PER_OUTLIER > self.listed.count())
     }
 }
 
@@ -59,57 +66,68 @@ impl Source<'_> {
         self.size.iter().product()
     }
 
-    /// Encodes the block by a pyramid, from the samples of `outer`, which also has nodes that only predict. `codes` is the
-    /// result; the fields are scratch. None if the block must be stored exactly.
+    /// Encodes the block, which covers `size` voxels, by a pyramid, from the samples of `outer`, which also has nodes that only
+    /// predict, and the known nodes. `codes` is the result; the fields are scratch. None if the block must be stored exactly, or,
+    /// above tier 0, without codes.
     ///
     /// The scheme's step suits most blocks. Where so many samples miss the bound that storing them exactly takes a large
-    /// share of the bytes, finer steps are tried.
+    /// share of the bytes, finer steps are tried. Samples of blocks above tier 0 are stored with the blocks below.
     pub(super) fn refine<R: Real>(
         &self,
         pyramid: &Pyramid,
+        size: [usize; 3],
         outer: &Source<'_>,
+        known: Option<Known<'_, R>>,
         [source, field, split]: &mut [Vec<R>; 3],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
+        let passes = self.codec.passes(pyramid, size);
+        clear(codes).resize(passes.codes(), 0);
+        field.resize(passes.nodes().iter().product(), R::default());
         let weighing = QuantizerSetup::new(self.codec, self.samples, self.missing.magnitude)?;
         let mut step = self.step::<R>(pyramid, &weighing)?;
         outer.load(&weighing, source);
-        let passes = self.codec.passes(pyramid, self.size);
-        codes.resize(passes.codes(), 0);
-        field.resize(passes.nodes().iter().product(), R::default());
         let mut encode = |step| {
-            let fits = passes.encode(step, source, outer.size, field, split, codes);
-            fits.then(|| self.checked(&weighing, &passes, field, codes))
+            let nodes = Nodes { values: &*source, size: outer.size };
+            let fits = passes.encode(step, nodes, known, field, split, codes);
+            fits.then(|| self.checked(&weighing, &passes, known, field, codes))
         };
         let mut checked = encode(step)?;
         let finest = step / self.codec.scheme.coarseness.max(1.0);
-        while checked.as_ref().is_none_or(Checked::has_many_outliers) && step > finest {
+        while checked.has_many_outliers() && step > finest {
+            let (coarser, before) = (step, checked.cost());
             step = (step / FINER).max(finest);
             checked = encode(step)?;
+            if self.codec.tiers() > 0 && before <= checked.cost() {
+                step = coarser; // finer steps leave the errors of known nodes
+                checked = encode(step)?;
+                break;
+            }
         }
-        let Checked { listed, mut tally } = checked?;
+        let Checked { listed, tally } = checked;
+        let mut tally = if self.codec.tier > 0 { Tally::new() } else { tally? };
         let outliers = tally.take_outliers(self.codec, self.samples);
-        let changes = passes.changes_of_coded(step, &listed, field);
+        let changes = passes.changes_of_coded(step, &listed, known, field);
         let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })
     }
 
-    /// Compares the field that codes give with the source. None if too many samples miss the bound.
+    /// Compares the field that codes give with the source.
     fn checked<R: Real>(
         &self,
         weighing: &QuantizerSetup,
         passes: &PredictionPasses<'_>,
+        known: Option<Known<'_, R>>,
         field: &[R],
         codes: &[i32],
-    ) -> Option<Checked> {
+    ) -> Checked {
         let listed = passes.list(codes);
-        let tally = if self.plain() {
-            self.check_samples(field)?
-        } else {
-            self.check_series(weighing, field, &passes.marked(&listed))?
+        let tally = match self.plain() {
+            true => self.check_samples(field),
+            false => self.check_series(weighing, field, &passes.marked(&listed, known)),
         };
-        Some(Checked { listed, tally })
+        Checked { listed, tally }
     }
 
     /// The step of the finest level. None if the block must be stored exactly.

@@ -21,7 +21,9 @@ impl Encoder {
         entry: &BlockEntry,
     ) -> Result<EncodedBlock> {
         let mut parts = Vec::new();
-        let is_packed_anew = |kind| to.scheme.pyramid.is_some() && matches!(kind, PartKind::Level(_));
+        // Parts of windows with tiers are packed in the newest way.
+        let is_packed_anew =
+            |kind| to.scheme.pyramid.is_some() && to.tiers() == 0 && matches!(kind, PartKind::Level(_));
         for part in entry.parts.iter().filter(|part| !is_packed_anew(part.kind)) {
             let raw = reader.part(entry, part)?;
             parts.push(self.part(part.kind, part.stats, &raw)?);
@@ -29,7 +31,7 @@ impl Encoder {
         if let Some(pyramid) = &to.scheme.pyramid
             && entry.parts.iter().any(|part| is_packed_anew(part.kind))
         {
-            let block = Block::read(reader, from, entry, size, &vec![true; from.basis.coefficients()])?;
+            let block = Block::read(reader, from, entry, size, &vec![true; from.basis.coefficients()], None)?;
             parts.extend(self.level_parts(to, pyramid, size, block.step, &block.all_codes(from))?);
         }
         parts.sort_by_key(|part| part.kind);
@@ -48,7 +50,8 @@ impl Encoder {
         let passes = codec.passes(pyramid, size);
         let listed = passes.list(codes);
         let all = vec![true; codec.basis.coefficients()];
-        let changes = Field::refined(codec, size, step, &listed, &all).changes(&passes, step, &listed);
+        let field = Field::refined(codec, size, step, &listed, None, &all);
+        let changes = field.changes(&passes, step, &listed, None);
         let mut parts = Vec::new();
         for (part, change) in (0..).zip(&changes) {
             let count = passes.count(part, &listed);

@@ -4,6 +4,7 @@ use super::WindowCodec;
 use super::block_with_ghosts::BlockWithGhosts;
 use super::error_weights::QuantizerSetup;
 use super::load::Missing;
+use super::pyramid::Nodes;
 use super::real::Real;
 use super::refine::Source;
 use std::borrow::Cow;
@@ -68,7 +69,8 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         field.resize(passes.nodes().iter().product(), R::default());
         codes.resize(passes.codes(), 0);
-        if !passes.encode(step, &self.nodes, self.outer, field, split, codes) {
+        let nodes = Nodes { values: &self.nodes, size: self.outer };
+        if !passes.encode(step, nodes, None, field, split, codes) {
             return None;
         }
         let outliers = source.estimate_outliers(weighing, field, &passes.marked_codes(codes));
@@ -120,12 +122,13 @@ mod tests {
                 single: true,
                 packing: Packing::Nested,
                 ghosts: true,
+                tiers: 0,
             };
             let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
             let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 32);
             let mut encoder = Encoder::new(3).expect("a usual level");
-            let id = BlockId { window: 0, block: 0, channel: 0 };
-            let encoded = encoder.block(&codec, id, SIZE, &samples).expect("a small block");
+            let id = BlockId::new(0, 0, 0);
+            let encoded = encoder.block(&codec, id, SIZE, &samples, None).expect("a small block");
             let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
             let trial = Trial::<f32>::new(&codec, SIZE.into(), codec.outer_size(SIZE), &samples);
             let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());

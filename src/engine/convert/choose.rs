@@ -97,6 +97,8 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) edge: usize,
     /// How the file's codes are packed.
     pub(super) packing: Packing,
+    /// The tiers above the blocks of a window with a pyramid.
+    pub(super) tiers: u8,
     /// The previous window's scheme, if the choice may start from it.
     pub(super) before: Option<&'a Scheme>,
 }
@@ -175,7 +177,8 @@ impl SchemeSelector<'_> {
     }
 
     /// The codec of the chosen scheme.
-    fn finished<R>(&self, scheme: Scheme, trials: Trials<'_, R>) -> WindowCodec {
+    fn finished<R>(&self, mut scheme: Scheme, trials: Trials<'_, R>) -> WindowCodec {
+        scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = self.tiers);
         let of_basis = trials.boxes.into_iter().find(|b| b.basis == scheme.basis);
         match of_basis {
             Some(of_basis) => {
@@ -320,7 +323,8 @@ impl SchemeSelector<'_> {
         }
         if let Some(before) = self.before {
             let begin = |scheme: &mut Scheme| {
-                scheme.pyramid = before.pyramid.as_ref().map(|p| Pyramid { single: self.single(), ..p.clone() });
+                scheme.pyramid =
+                    before.pyramid.as_ref().map(|p| Pyramid { single: self.single(), tiers: 0, ..p.clone() });
                 scheme.coarseness = before.coarseness;
             };
             found.iter_mut().filter(|scheme| scheme.basis == before.basis).for_each(begin);
@@ -342,7 +346,16 @@ impl SchemeSelector<'_> {
 
     fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
         let ((growth, most), ghosts) = (GROWTHS[0], self.packing == Packing::Nested);
-        Pyramid { order: order.to_vec(), stencil, growth, most, single: self.single(), packing: self.packing, ghosts }
+        Pyramid {
+            order: order.to_vec(),
+            stencil,
+            growth,
+            most,
+            single: self.single(),
+            packing: self.packing,
+            ghosts,
+            tiers: 0,
+        }
     }
 
     /// Whether 32-bit floats are precise enough.

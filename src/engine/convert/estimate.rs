@@ -25,6 +25,7 @@ use wavesplat_core::codec::encode::Encoded;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan_frame};
 use wavesplat_core::source::{Archive, FrameSource, FrameWindow, read_frames_into};
+use wavesplat_format::BlockId;
 
 /// The largest number of blocks coded in a window, and of windows.
 const BLOCKS: usize = 24;
@@ -226,6 +227,7 @@ impl BlocksCoded<'_> {
         let mut file = WindowWriter::new(self.input, &plan, target);
         let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
         let mut reader = WindowReader::new(self.input, self.plan, &done, &idle);
+        reader.code_some_blocks();
         if self.is_rough {
             reader.choose_roughly(scheme.take());
         }
@@ -249,9 +251,9 @@ impl BlocksCoded<'_> {
         window: &'b dyn FrameWindow,
         job: &'b Arc<WindowJob>,
     ) -> impl Iterator<Item = Result<Batch>> + 'b {
-        let (all, some) = (self.plan.blocks.len(), self.blocks.len());
-        let numbers: Vec<usize> =
-            (0..some * self.plan.channels()).map(|i| i / some * all + self.blocks[i % some]).collect();
+        let some = self.blocks.len();
+        let id = move |i: usize| BlockId::new(job.index, (i / some) as u16, self.blocks[i % some] as u32);
+        let numbers: Vec<BlockId> = (0..some * self.plan.channels()).map(id).collect();
         (0..numbers.len()).step_by(self.plan.batch).map(move |first| {
             let end = numbers.len().min(first + self.plan.batch);
             let blocks = numbers[first..end].iter().map(|block| reader.gather(window, job, *block));

@@ -1,6 +1,7 @@
 //! The reader stage: reads windows of frames and sends batches of blocks.
 
 use super::choose::{SchemeSelector, SpatialPredictor, most_samples};
+use super::coarse::CoarseBlocks;
 use super::coded_input::{BRIGHTNESS, CodedInput};
 use super::sampled::{self, Pixel};
 use super::warnings::{self, Fill, Findings};
@@ -74,6 +75,9 @@ pub(super) fn read(
     Ok((busy, reader.findings))
 }
 
+/// This share of the memory has decoded blocks above others.
+const ABOVE_SHARE: usize = 8;
+
 /// The samples that a scheme is chosen from are divided by this, if it need not be the best.
 const ROUGH: usize = 4;
 
@@ -97,6 +101,8 @@ pub(super) struct WindowReader<'a> {
     scheme: Option<Scheme>,
     /// Whether schemes are chosen with less care, for an estimate.
     is_rough: bool,
+    /// Whether only some blocks are coded, for an estimate.
+    is_of_some_blocks: bool,
     /// The number of frames in the file so far.
     frames: u64,
     /// Frames of the file that precede the source's first frame.
@@ -113,7 +119,11 @@ impl<'a> WindowReader<'a> {
         // Without a pyramid, readers of version 1.0 suffice.
         let plain = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0;
         let packing = if plain { Packing::Flat } else { Packing::default() };
-        let features = done.features.unwrap_or(Features { packing, described: archive.description.is_some() });
+        let features = done.features.unwrap_or(Features {
+            packing,
+            described: archive.description.is_some(),
+            tiered: packing == Packing::Nested && plan.tiers() > 0,
+        });
         let (id, range, scheme) = (done.id, None, None);
         Self {
             config,
@@ -127,9 +137,15 @@ impl<'a> WindowReader<'a> {
             findings: Findings::default(),
             scheme,
             is_rough: false,
+            is_of_some_blocks: false,
             frames: 0,
             before: 0,
         }
+    }
+
+    /// Codes blocks without those above them.
+    pub(super) fn code_some_blocks(&mut self) {
+        self.is_of_some_blocks = true;
     }
 
     /// Chooses schemes from fewer samples, each beginning with the one before; the first with `scheme`.
@@ -238,6 +254,7 @@ impl<'a> WindowReader<'a> {
             most: if self.is_rough { most / ROUGH } else { most },
             edge: self.plan.blocks.edges[0],
             packing: self.features.packing,
+            tiers: if self.features.tiered && !self.is_of_some_blocks { self.plan.tiers() } else { 0 },
             before,
         };
         let mut codec = selector.choose()?;
@@ -250,7 +267,9 @@ impl<'a> WindowReader<'a> {
         let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        Ok(WindowJob { index, first_frame, id, features: self.features, codec, range, digest: scan.digest, times })
+        let coarse = CoarseBlocks::new(self.config.memory / ABOVE_SHARE);
+        let (features, digest) = (self.features, scan.digest);
+        Ok(WindowJob { index, first_frame, id, features, codec, coarse, range, digest, times })
     }
 
     /// The delta of a window. `of_window` is the range of its samples, `range` that of all samples up to its end.
@@ -323,13 +342,12 @@ impl<'a> WindowReader<'a> {
         out: &Sender<Batch>,
         busy: &mut Duration,
     ) -> Result<bool> {
-        let (all, batch) = (self.plan.blocks_of_window(), self.plan.batch);
-        for first in (0..all).step_by(batch) {
+        for ids in self.batches(job) {
             let started = Instant::now();
-            let blocks: Result<Vec<_>> = (first..all.min(first + batch)).map(|b| self.gather(window, job, b)).collect();
-            let blocks = blocks?;
-            blocks.iter().for_each(|block| self.look_at_variation(job, block));
-            let last = first + batch >= all;
+            let blocks = ids.iter().map(|id| self.gather(window, job, *id)).collect::<Result<Vec<_>>>()?;
+            let fine = blocks.iter().filter(|block| block.id.tier == 0);
+            fine.for_each(|block| self.look_at_variation(job, block));
+            let last = ids.last() == Some(&self.plan.last_block(job.index));
             if last {
                 window.check_unchanged()?;
             }
@@ -342,16 +360,51 @@ impl<'a> WindowReader<'a> {
         Ok(true)
     }
 
-    /// Reads the samples that coding one block takes, frame by frame. Block numbers run through all channels.
-    pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, block: usize) -> Result<BlockSamples> {
-        let (channel, block) = (block / self.plan.blocks.len(), block % self.plan.blocks.len());
-        let Region { start, .. } = self.plan.blocks.region(block);
-        let known = self.plan.block_with_ghosts(&job.codec, block).known;
+    /// The blocks of a window, tier after tier, as they are coded together.
+    fn batches(&self, job: &WindowJob) -> Vec<Vec<BlockId>> {
+        let (plan, window) = (self.plan, job.index);
+        let of_tier = |tier: u8| -> Vec<BlockId> {
+            let blocks = plan.blocks_of_tier(tier).len() as u32;
+            let of_channel =
+                |channel| (0..blocks).map(move |block| BlockId { tier, ..BlockId::new(window, channel, block) });
+            (0..plan.channels() as u16).flat_map(of_channel).collect()
+        };
+        let tiers = (0..=job.codec.tiers()).rev();
+        tiers.flat_map(|tier| of_tier(tier).chunks(plan.batch).map(<[BlockId]>::to_vec).collect::<Vec<_>>()).collect()
+    }
+
+    /// Reads the samples that coding one block takes, frame by frame.
+    pub(super) fn gather(&self, window: &dyn FrameWindow, job: &WindowJob, id: BlockId) -> Result<BlockSamples> {
+        if id.tier > 0 {
+            return self.gather_coarse(window, job, id);
+        }
+        let Region { start, .. } = self.plan.blocks.region(id.block as usize);
+        let known = self.plan.block_with_ghosts(&job.codec, id.block as usize).known;
         let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
         let mut samples = self.idle.take().unwrap_or_default();
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
         read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;
-        Ok(BlockSamples { id: BlockId { window: job.index, block: block as u32, channel: channel as u16 }, samples })
+        Ok(BlockSamples { id, samples })
+    }
+
+    /// Reads the samples at the nodes of a block of a tier above 0, frame by frame.
+    fn gather_coarse(&self, window: &dyn FrameWindow, job: &WindowJob, id: BlockId) -> Result<BlockSamples> {
+        let [xs, ys, zs] = &self.plan.coarse_voxels(&job.codec.at(id.tier, 0), id);
+        let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
+        let each = sample.size();
+        let end = |places: &[usize]| places.last().map_or(0, |last| last + 1);
+        let (mut samples, mut rows) = (self.idle.take().unwrap_or_default(), Vec::new());
+        samples.clear();
+        for (frame, z) in (0..window.frames()).flat_map(|frame| zs.iter().map(move |z| (frame, *z))) {
+            let plane = Region { start: [xs[0], ys[0], z], end: [end(xs), end(ys), z + 1] };
+            rows.resize(plane.voxels() * each, 0);
+            window.read_box(frame, &plane, &mut rows)?;
+            for y in ys {
+                let row = &rows[(y - ys[0]) * plane.dims()[0] * each..];
+                xs.iter().for_each(|x| samples.extend_from_slice(&row[(x - xs[0]) * each..][..each]));
+            }
+        }
+        Ok(BlockSamples { id, samples })
     }
 }
 

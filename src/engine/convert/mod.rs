@@ -16,6 +16,7 @@
 //! record holds all that the next window needs, so the resumed file has the same bytes as an uninterrupted one.
 
 mod choose;
+mod coarse;
 mod coded_input;
 pub mod estimate;
 mod gather;
@@ -38,6 +39,7 @@ mod warnings;
 
 use crate::file::report::{BoundReport, WindowReport};
 pub use choose::{SchemeConstraint, SpatialPredictor};
+use coarse::CoarseBlocks;
 use coded_input::CodedInput;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use gather::{Batch, BlockSamples};
@@ -395,15 +397,35 @@ fn encode_batch(
 ) -> Result<EncodedBatch> {
     let encode = |BlockSamples { id, samples }| {
         let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-        let extent = plan.block_with_ghosts(&window.codec, id.block as usize);
         let samples = to_channel(plan.colour_transform, id, samples, read);
-        let encoded = encoder.block(&window.codec, id, extent, &samples).map_err(bug);
+        let encoded = encode_block(&mut encoder, plan, &window, id, &samples);
         encoders.put(encoder);
         read.put(samples);
         encoded
     };
     let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
     Ok(EncodedBatch { window: window.clone(), blocks: blocks?, last })
+}
+
+/// Encodes a block, and keeps it for the blocks below if it has some.
+fn encode_block(
+    encoder: &mut Encoder,
+    plan: &Plan<'_>,
+    window: &WindowJob,
+    id: BlockId,
+    samples: &[u8],
+) -> Result<Encoded> {
+    let above = window.coarse.above(plan, &window.codec, id)?;
+    if id.tier == 0 {
+        let extent = plan.block_with_ghosts(&window.codec, id.block as usize);
+        return encoder.block(&window.codec, id, extent, samples, above.as_ref()).map_err(bug);
+    }
+    let codec = window.codec.at(id.tier, 0);
+    let nodes = plan.coarse_nodes(&codec, id);
+    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
+    let (block, field) = coded.map_err(bug)?;
+    window.coarse.add(plan, &codec, &block, field);
+    Ok(Encoded { block, share: 0.0 })
 }
 
 /// Converts the samples of a block to those of its channel.
@@ -443,6 +465,8 @@ struct WindowJob {
     /// How the file's codes are packed, and whether it has a description.
     features: Features,
     codec: WindowCodec,
+    /// The blocks of tiers above 0 that were coded so far.
+    coarse: CoarseBlocks,
     /// The range that the tolerance refers to: the given one, or that of all samples up to the window's end.
     range: (f64, f64),
     digest: u64,

@@ -4,14 +4,14 @@ use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
 use crate::file::promise::UNIT_RANGE;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
-use wavesplat_core::base::grid::BlockGrid;
+use wavesplat_core::base::grid::{BlockGrid, Region};
 use wavesplat_core::base::memory;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::Bound;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
 use wavesplat_core::wavelet;
-use wavesplat_format::{Basis, Metadata};
+use wavesplat_format::{Basis, BlockId, Metadata};
 
 /// Decisions made from the configuration and the archive before any frame is read.
 #[derive(Debug)]
@@ -38,6 +38,9 @@ fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usiz
     if alone { edge } else { longest.min(edge) }
 }
 
+/// Whether files have tiers: not before everything that reads files knows them.
+const WRITES_TIERS: bool = false;
+
 /// The widest blocks of thin volumes.
 const WIDEST: usize = 256;
 
@@ -62,6 +65,48 @@ impl<'a> Plan<'a> {
             size,
             known: std::array::from_fn(|a| (start[a] + outer[a]).min(self.blocks.dims[a]) - start[a]),
         }
+    }
+
+    /// The voxels that a block covers along x, y, z.
+    pub(super) fn size(&self, id: BlockId) -> [usize; 3] {
+        self.boxed(id).dims()
+    }
+
+    /// The voxels that a block covers.
+    fn boxed(&self, id: BlockId) -> Region {
+        self.blocks_of_tier(id.tier).region(id.block as usize)
+    }
+
+    /// The blocks of a tier.
+    pub(super) fn blocks_of_tier(&self, tier: u8) -> BlockGrid {
+        BlockGrid::cubes(self.blocks.dims, self.blocks.edges[0] << tier)
+    }
+
+    /// The least number of tiers for which the last has one block; 0 if blocks cannot be halved, or tiers are not written.
+    pub(super) fn tiers(&self) -> u8 {
+        if !WRITES_TIERS {
+            return 0;
+        }
+        let is_one = |tier: &u8| self.blocks_of_tier(*tier).len() == 1;
+        let is_even = self.blocks.edges[0].is_multiple_of(2);
+        (0..wavesplat_format::limits::MAX_TIERS).find(is_one).filter(|_| is_even).unwrap_or(0)
+    }
+
+    /// The nodes of a block of a tier above 0, and how many samples along x, y, z they are made from.
+    pub(super) fn coarse_nodes(&self, codec: &WindowCodec, id: BlockId) -> BlockWithGhosts {
+        let size = codec.decoded_size(self.size(id));
+        BlockWithGhosts { size, known: self.coarse_voxels(codec, id).map(|voxels| voxels.len()) }
+    }
+
+    /// The places along x, y, z of the samples that the nodes of a block of a tier above 0 are made from: those at its nodes, or
+    /// instead of a node behind the volume the last two.
+    pub(super) fn coarse_voxels(&self, codec: &WindowCodec, id: BlockId) -> [Vec<usize>; 3] {
+        let (region, dims) = (self.boxed(id), self.blocks.dims);
+        let size = codec.decoded_size(region.dims());
+        std::array::from_fn(|a| {
+            let nodes = (0..size[a]).map(|node| region.start[a] + (node << id.tier));
+            nodes.flat_map(|at| if at < dims[a] { at..at + 1 } else { dims[a] - 2..dims[a] }).collect()
+        })
     }
 
     pub(super) fn new(input: &'a CodedInput) -> Result<Self> {
@@ -102,6 +147,11 @@ impl<'a> Plan<'a> {
 
     pub(super) fn channels(&self) -> usize {
         self.start.channels.into()
+    }
+
+    /// The block that ends a window.
+    pub(super) fn last_block(&self, window: u32) -> BlockId {
+        BlockId::new(window, self.start.channels - 1, (self.blocks.len() - 1) as u32)
     }
 
     pub(super) fn blocks_of_window(&self) -> usize {

@@ -74,7 +74,8 @@ impl<'a, W: Write> WindowWriter<'a, W> {
             let started = Instant::now();
             progress.check()?;
             self.append(&batch)?;
-            progress.advance(batch.blocks.len() as u64);
+            let fine = batch.blocks.iter().filter(|encoded| encoded.block.id.tier == 0);
+            progress.advance(fine.count() as u64);
             self.busy += started.elapsed();
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! An open coefficient file: the format's reader over any storage, in this library's terms.
 
+use crate::file::above::AboveBlocks;
 use crate::file::counted::Counted;
 use crate::file::decoded::DecodedBlocks;
 use crate::file::detail;
@@ -47,6 +48,8 @@ pub struct CoefficientFile {
     skipped: Option<Arc<Damage>>,
     /// Decoded blocks that are kept, if there is room for some.
     pub(super) kept: Option<Arc<DecodedBlocks>>,
+    /// Decoded blocks of tiers above 0.
+    pub(super) above: Arc<AboveBlocks>,
 }
 
 /// The damage to a file, block by block.
@@ -67,7 +70,7 @@ impl Damage {
     }
 
     fn is_in_window(&self, window: u32) -> bool {
-        let first = BlockId { window, block: 0, channel: 0 };
+        let first = BlockId::new(window, 0, 0);
         self.blocks.range(first..).next().is_some_and(|(id, _)| id.window == window)
     }
 }
@@ -133,6 +136,7 @@ impl CoefficientFile {
             state: None,
             skipped: None,
             kept: None,
+            above: Arc::default(),
         })
     }
 
@@ -285,9 +289,7 @@ impl CoefficientFile {
 
     /// The directory's leaves of one channel of a window.
     pub(crate) fn leaves_of(&self, window: u32, channel: usize) -> &[LeafEntry] {
-        let leaves = self.leaves(window);
-        let each = leaves.len() / self.channels();
-        leaves.get(channel * each..(channel + 1) * each).unwrap_or_default()
+        self.reader.leaves_of(window, 0, channel as u16)
     }
 
     /// Reads every block, then treats damaged ones as missing samples.
@@ -301,10 +303,23 @@ impl CoefficientFile {
             true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // threads would push out each other's pages
             false => leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?,
         };
-        let damage = Damage { blocks: found.into_iter().flatten().collect(), met: Mutex::default() };
+        let blocks = self.with_blocks_below(found.into_iter().flatten().collect());
+        let damage = Damage { blocks, met: Mutex::default() };
         self.skipped = Some(damage.into());
         self.kept = self.kept.map(|kept| Arc::new(kept.emptied())); // damaged blocks must not be found without skipping
         Ok(self)
+    }
+
+    /// Damaged blocks, and those that begin with the nodes of one of them.
+    fn with_blocks_below(&self, mut damaged: BTreeMap<BlockId, String>) -> BTreeMap<BlockId, String> {
+        let above: Vec<u32> = damaged.keys().filter(|id| id.tier > 0).map(|id| id.window).collect();
+        for leaf in above.iter().flat_map(|window| self.leaves(*window)) {
+            for id in leaf.ids() {
+                let wrong = damaged.get(&self.metadata().above(id)).cloned();
+                wrong.into_iter().for_each(|wrong| _ = damaged.entry(id).or_insert(wrong));
+            }
+        }
+        damaged
     }
 
     /// The damage to the blocks of a leaf; an error if the storage fails.
@@ -399,11 +414,17 @@ impl CoefficientFile {
             skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
             return Ok(Block::missing(codec, size));
         }
-        Block::read(&self.reader, codec, entry, size, wanted).map_err(|e| self.failed(e))
+        let (above, bytes_above) = match entry.is_exact() {
+            true => (None, 0),
+            false => self.above(codec, entry.id, wanted)?,
+        };
+        let mut block = Block::read(&self.reader, codec, entry, size, wanted, above).map_err(|e| self.failed(e))?;
+        block.bytes_read += bytes_above;
+        Ok(block)
     }
 
     /// All voxels of a block, decoded or not.
-    fn all_voxels(&self, entry: &BlockEntry) -> Result<[usize; 3]> {
+    pub(super) fn all_voxels(&self, entry: &BlockEntry) -> Result<[usize; 3]> {
         self.reader.geometry(entry.id).map(|of| of.size).map_err(|e| self.failed(e))
     }
 
@@ -424,7 +445,7 @@ impl CoefficientFile {
         frames: &[usize],
     ) -> Result<Vec<f32>> {
         let (size, stride) = (self.all_voxels(entry)?, stride << self.lod);
-        coarse::thinned(&self.reader, codec, entry, size, stride, frames).map_err(|e| self.failed(e))
+        coarse::thinned(codec, entry, size, stride, frames, |wanted| self.block(codec, entry, wanted))
     }
 
     /// Bytes of the file that were read so far.

@@ -161,7 +161,7 @@ mod tests {
     use super::*;
 
     fn key(block: u32) -> DecodedKey {
-        DecodedKey { id: BlockId { window: 0, block, channel: 0 }, lod: 0, form: DecodedForm::Samples }
+        DecodedKey { id: BlockId::new(0, 0, block), lod: 0, form: DecodedForm::Samples }
     }
 
     fn keep(blocks: &DecodedBlocks, block: u32) {

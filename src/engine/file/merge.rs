@@ -358,7 +358,8 @@ impl<W: Write> Merger<'_, W> {
             let length = u64::from(lost.length).min(frames.end - first) as u32;
             let window = Window { range: lost.range, ..Window::lost(first, length) };
             self.report.windows_lost += 1;
-            self.report.blocks_lost += self.writer.metadata().blocks_per_window();
+            let metadata = self.writer.metadata();
+            self.report.blocks_lost += u64::from(metadata.blocks_per_channel(0)) * u64::from(metadata.channels);
             if !self.has(self.next, &window, Path::new("a missing shard"))? {
                 self.add_lost_window(window)?;
             }
@@ -370,10 +371,8 @@ impl<W: Write> Merger<'_, W> {
     fn add_lost_window(&mut self, window: Window) -> Result<()> {
         let number = self.next as u32;
         self.written(|writer| writer.begin_window(WindowRecord { number, window, times: Vec::new() }))?;
-        let (channels, blocks) = (self.writer.metadata().channels, self.writer.metadata().blocks_per_channel());
-        for id in
-            (0..channels).flat_map(|channel| (0..blocks).map(move |block| BlockId { window: number, block, channel }))
-        {
+        let (channels, blocks) = (self.writer.metadata().channels, self.writer.metadata().blocks_per_channel(0));
+        for id in (0..channels).flat_map(|channel| (0..blocks).map(move |block| BlockId::new(number, channel, block))) {
             self.report.blocks += 1;
             self.written(|writer| writer.append_lost(id))?;
         }

@@ -6,9 +6,11 @@
 mod counted;
 mod detail;
 pub mod promise;
+pub(crate) mod above;
 mod budget;
 mod decoded;
 mod coefficient_file;
+mod tiers;
 mod fetch;
 mod keep;
 mod check;

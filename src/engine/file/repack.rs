@@ -42,7 +42,7 @@ pub fn repack(
     let metadata = nested(file.metadata());
     let first_digest = metadata.windows.first().map_or(0, |window| window.digest);
     let description = file.description()?;
-    let features = Features { packing: metadata.packing(), described: description.is_some() };
+    let features = Features { described: description.is_some(), ..metadata.features() };
     let id = metadata.file_id(first_digest, features).map_err(failed)?;
     let mut writer = Writer::with_features(out, id, &metadata, features).map_err(failed)?;
     let at_once = blocks_within(memory, 0, file.block_bytes(), "rewriting")?;

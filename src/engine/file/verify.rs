@@ -221,9 +221,10 @@ fn check_block(
     entry: &BlockEntry,
     source: Option<&dyn FrameWindow>,
 ) -> Result<Comparison> {
+    let codec = &codec.at(entry.id.tier, 0);
     let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
     check_coefficients(file, entry, &block, codec)?;
-    let Some(source) = source else { return Ok(Comparison::default()) };
+    let Some(source) = source.filter(|_| entry.id.tier == 0) else { return Ok(Comparison::default()) };
     let region = file.blocks.region(entry.id.block as usize);
     let original = original(file, source, codec, entry, &region)?;
     let first_frame = file.window_range(entry.id.window).start;

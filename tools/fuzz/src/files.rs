@@ -31,13 +31,16 @@ pub fn metadata(data: &[u8]) {
     assert_eq!(metadata.encode().expect("it was read"), data);
     let start = metadata.start();
     assert!(start.validate().is_ok() && start.frames == 0);
-    assert!(metadata.block_box(metadata.blocks_per_channel()).is_none());
-    for block in [0, metadata.blocks_per_channel() / 2, metadata.blocks_per_channel() - 1] {
-        let id = BlockId { window: metadata.windows.len() as u32 - 1, block, channel: metadata.channels - 1 };
+    let window = metadata.windows.len() as u32 - 1;
+    let all = |tier| metadata.blocks_per_channel(tier);
+    assert!((0..=metadata.tiers(window)).all(|tier| metadata.block_box(tier, all(tier)).is_none()));
+    let some = |tier| [0, all(tier) / 2, all(tier) - 1].map(|block| (tier, block));
+    for (tier, block) in (0..=metadata.tiers(window)).flat_map(some) {
+        let id = BlockId { tier, ..BlockId::new(window, metadata.channels - 1, block) };
         let geometry = metadata.geometry(id).expect("a block of the archive");
-        let (first, size) = metadata.block_box(block).expect("a block of the archive");
+        let (first, size) = metadata.block_box(tier, block).expect("a block of the archive");
         assert!((0..3).all(|axis| size[axis] > 0 && first[axis] + size[axis] <= metadata.dims[axis]));
-        assert!(geometry.samples() as u64 <= limits::MAX_BLOCK_SAMPLES);
+        assert!(tier > 0 || geometry.samples() as u64 <= limits::MAX_BLOCK_SAMPLES);
         for level in 0..geometry.window.parts() as u8 {
             assert!(geometry.codes(level).is_some_and(|codes| codes as u64 <= limits::MAX_BLOCK_SAMPLES));
             geometry.max_raw_len(PartKind::Level(level));

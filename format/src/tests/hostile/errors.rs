@@ -106,8 +106,8 @@ fn lost_blocks_and_nonexistent_blocks_are_different_errors() {
     assert!(matches!(reader.check_parts(lost), Err(Error::Lost(id)) if id == lost.id));
     assert!(matches!(reader.check_stored(lost), Err(Error::Lost(_))));
     assert!(matches!(reader.outliers(lost), Err(Error::Lost(_))));
-    let last = BlockId { window: u32::MAX, block: u32::MAX, channel: u16::MAX };
-    let first = BlockId { window: 0, block: 0, channel: 0 };
+    let last = BlockId::new(u32::MAX, u16::MAX, u32::MAX);
+    let first = BlockId::new(0, 0, 0);
     for id in [last, BlockId { window: 4, ..first }, BlockId { block: 4, ..first }, BlockId { channel: 2, ..first }] {
         assert!(matches!(reader.entry(id), Err(Error::Invalid(_))), "{id}");
     }

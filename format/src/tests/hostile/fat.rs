@@ -58,6 +58,7 @@ fn windows(packing: Packing) -> Vec<Window> {
             single,
             packing,
             ghosts: packing == Packing::Nested,
+            tiers: 0,
         })
     };
     let functions = vec![32767, 0, -5, 9, 100, 200, -300, 0];

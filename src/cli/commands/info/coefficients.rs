@@ -76,7 +76,7 @@ impl Info {
             m.windows.iter().map(|w| WindowReport::new(w, voxels * u64::from(m.channels))).collect();
         let times = time_labels(m);
         let described = file.description()?;
-        let has_features = m.packing() == Packing::Nested || described.is_some();
+        let has_features = m.features().packing == Packing::Nested || described.is_some();
         Ok(Self {
             format: if has_features { "1.1" } else { "1.0" },
             id: file.id().to_string(),

@@ -1,5 +1,6 @@
 //! Corrections of predicted nodes: codes are added to them (decoding), or computed from them (encoding).
 
+use super::known::KnownNodes;
 use crate::codec::real::Real;
 use crate::codec::rows;
 use wavesplat_format::SparseCodes;
@@ -18,6 +19,8 @@ pub(super) struct Decoding<'a, R> {
     pub(super) codes: &'a SparseCodes,
     /// For each pass the step, and the first run of each of its boxes.
     pub(super) passes: Vec<(R, Vec<usize>)>,
+    /// Nodes that have their value from the block above.
+    pub(super) known: Option<KnownNodes<'a, R>>,
 }
 
 impl<R: Real> Correction<R> for Decoding<'_, R> {
@@ -25,6 +28,9 @@ impl<R: Real> Correction<R> for Decoding<'_, R> {
     fn correct(&mut self, _: usize, _: usize, _: &mut [R]) {}
 
     fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
+        if let Some(known) = &self.known {
+            known.restore(pass, slice, nodes, |_, _, _| {});
+        }
         let (step, runs) = &self.passes[pass];
         for run in runs {
             let (places, values) = self.codes.run(run + slice);
@@ -44,6 +50,8 @@ pub(super) struct Encoding<'a, R> {
     pub(super) codes: Vec<&'a mut [i32]>,
     /// For each pass its first node in `split`, its step and the inverse of that.
     pub(super) passes: Vec<(usize, [R; 2])>,
+    /// Nodes that have their value from the block above, and no code.
+    pub(super) known: Option<KnownNodes<'a, R>>,
     /// Whether all codes fit.
     pub(super) fits: bool,
 }
@@ -55,5 +63,12 @@ impl<R: Real> Correction<R> for Encoding<'_, R> {
         self.fits &= rows::encode(&self.split[start + first..], predicted, &mut self.codes[pass][first..], steps);
     }
 
-    fn complete(&mut self, _: usize, _: usize, _: &mut [R]) {}
+    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
+        let Some(known) = &self.known else { return };
+        let (codes, count) = (&mut *self.codes[pass], nodes.len());
+        known.restore(pass, slice, nodes, |at, apart, nodes| {
+            let codes = codes.get_mut(slice * count + at..).unwrap_or_default(); // known passes have none
+            codes.iter_mut().step_by(apart).take(nodes).for_each(|code| *code = 0);
+        });
+    }
 }

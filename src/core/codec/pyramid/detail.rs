@@ -9,22 +9,23 @@ impl<'a> PredictionPasses<'a> {
     ///
     /// Passes in space of finer levels than `lod` add no such nodes. The finest of these are still needed, because they
     /// drop the nodes that only predict. Passes along time add such nodes in every level.
-    pub(crate) fn with_detail(pyramid: &'a Pyramid, size: [usize; 3], k: usize, lod: u32) -> Self {
-        let whole = Self::new(pyramid, size, k);
+    pub(crate) fn with_detail(pyramid: &'a Pyramid, size: [usize; 3], k: usize, tier: u8, lod: u32) -> Self {
+        let whole = Self::new(pyramid, size, k, tier);
         if lod == 0 {
             return whole;
         }
+        let lod_of_levels = lod + u32::from(tier);
         let every = |pass: &Pass, a: usize| if a < 3 { pass.strides[a].max(1 << lod) } else { pass.strides[a] };
         let step = |pass: &Pass| {
             let lattice: [usize; 4] = std::array::from_fn(|a| pass.limits[a].div_ceil(every(pass, a)));
             let [_, _, _, added] = pass.extent();
             match pass.axis {
                 Some(Axis::T) => Step { axis: pass.axis, lattice, added: [lattice[0], lattice[1], lattice[2], added] },
-                _ if has_nodes(pass, lod) => Step { lattice, ..Step::from(pass) },
+                _ if has_nodes(pass, lod_of_levels) => Step { lattice, ..Step::from(pass) },
                 axis => Step { axis, lattice, added: [0; 4] },
             }
         };
-        let kept: Vec<&Pass> = whole.passes.iter().filter(|pass| is_kept(pass, lod)).collect();
+        let kept: Vec<&Pass> = whole.passes.iter().filter(|pass| is_kept(pass, lod_of_levels)).collect();
         let steps: Vec<Step> = kept.iter().map(|pass| step(pass)).collect();
         let coarse = |pass: &&Pass| Pass {
             strides: std::array::from_fn(|a| every(pass, a) >> if a < 3 { lod } else { 0 }),
@@ -32,22 +33,23 @@ impl<'a> PredictionPasses<'a> {
         };
         let passes: Vec<Pass> = kept.iter().map(coarse).collect();
         let stages = Stages::new(pyramid.stencil, &steps);
-        let [x, y, z] = size.map(|n| n.div_ceil(1 << lod));
+        let [x, y, z] = pyramid.nodes(size, tier).map(|n| n.div_ceil(1 << lod));
         let shape = [x, y, z, whole.shape[3]];
         let mut new = Self { pyramid, shape, pyramids: whole.pyramids, passes, steps, boxes: Vec::new(), stages };
-        new.boxes = whole.boxes.iter().filter_map(|of| of.of).map(|of| new.thinned(&whole, &of, lod)).collect();
+        new.boxes =
+            whole.boxes.iter().filter_map(|of| of.of).map(|of| new.thinned(&whole, &of, lod, lod_of_levels)).collect();
         new
     }
 
     /// The part of a code box of the whole block that this level of detail reads.
-    fn thinned(&self, whole: &Self, of: &PassBox, lod: u32) -> PlacedBox {
+    fn thinned(&self, whole: &Self, of: &PassBox, lod: u32, lod_of_levels: u32) -> PlacedBox {
         let (pass, part) = (whole.passes[of.pass], of.part);
         let mut at = CodeBox { allowed: of.allowed, ..CodeBox::contiguous(of.extents(whole.extent(of.pass))) };
         let left_out = PlacedBox { of: None, part, at, every: [1; 3] };
-        if !has_nodes(&pass, lod) {
+        if !has_nodes(&pass, lod_of_levels) {
             return left_out;
         }
-        let number = whole.passes[..of.pass].iter().filter(|pass| is_kept(pass, lod)).count();
+        let number = whole.passes[..of.pass].iter().filter(|pass| is_kept(pass, lod_of_levels)).count();
         let apart: [usize; 3] = std::array::from_fn(|a| of.every[a] * pass.strides[a]);
         let every = apart.map(|apart| (1_usize << lod).div_ceil(apart));
         if every == [1; 3] {

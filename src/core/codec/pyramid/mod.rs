@@ -19,16 +19,25 @@
 //! the coarse lattices have a ghost node behind the last voxel, with codes of its own, so that the last voxel is interpolated
 //! and not extrapolated. The finest passes drop it again.
 //!
+//! With tiers, coarse lattices are coded in wider blocks of their own. A block then begins with the decoded nodes of the block above:
+//!
+//! ```text
+//! v^_tier = U_z U_y U_x v^_(tier+1) + step q                                                              (eq 44)
+//! ```
+//!
 //! Every pass is linear in its codes: the decoded field is q_0 + U_0 (q_1 + U_1 (q_2 + ...)), times their steps. So one
 //! k can be decoded and splatted without the others.
 
 mod corrections;
 mod detail;
+mod known;
 mod refine;
 mod stages;
 mod stencil;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tier_tests;
 
 use super::buffer::Buffer;
 use super::codes::PooledCodes;
@@ -37,10 +46,13 @@ use super::rows::{self, Change, add_changes, add_changes_to_zero};
 use crate::base::vectors::dispatch;
 use crate::wavelet;
 use corrections::{Correction, Decoding, Encoding};
+use known::KnownNodes;
+pub(crate) use known::{Known, Nodes};
 use refine::gather;
 use stages::{Stages, Step};
 use std::ops::Range;
-use wavesplat_format::{Axis, BlockEntry, CodeBox, DenseCodes, Pass, PassBox, Pyramid, Reader, SparseCodes, Storage};
+use wavesplat_format::{Axis, BlockEntry, CodeBox, DenseCodes, EncodedBlock, PartKind, Pass, PassBox, Pyramid, Reader};
+use wavesplat_format::{SparseCodes, Storage};
 
 /// The number of level parts of a block.
 const PARTS: usize = Pyramid::PARTS as usize;
@@ -74,11 +86,11 @@ struct PlacedBox {
 }
 
 impl<'a> PredictionPasses<'a> {
-    /// The passes over a block with `k` coefficients for each voxel.
-    pub(crate) fn new(pyramid: &'a Pyramid, size: [usize; 3], k: usize) -> Self {
+    /// The passes over a block of a tier that covers `size` voxels with `k` coefficients each.
+    pub(crate) fn new(pyramid: &'a Pyramid, size: [usize; 3], k: usize, tier: u8) -> Self {
         let (own, pyramids) = if pyramid.order.contains(&Axis::T) { (k, 1) } else { (1, k) };
-        let [x, y, z] = size;
-        let passes = pyramid.passes(size, own);
+        let [x, y, z] = pyramid.nodes(size, tier);
+        let passes = pyramid.passes(size, own, tier);
         let steps: Vec<Step> = passes.iter().map(Step::from).collect();
         let stages = Stages::new(pyramid.stencil, &steps);
         let mut new = Self { pyramid, shape: [x, y, z, own], pyramids, passes, steps, boxes: Vec::new(), stages };
@@ -186,6 +198,22 @@ impl<'a> PredictionPasses<'a> {
         Ok(codes)
     }
 
+    /// The codes of a block that is not yet stored.
+    pub(crate) fn unpack(&self, block: &EncodedBlock) -> wavesplat_format::Result<PooledCodes> {
+        let mut codes = PooledCodes::new();
+        for part in 0..Pyramid::PARTS {
+            let boxes = self.placed_boxes(part);
+            match block.parts.iter().find(|found| found.kind == PartKind::Level(part)) {
+                Some(found) => {
+                    let unpacked = self.pyramid.packing.unpack(&found.payload()?, &boxes, &mut codes);
+                    unpacked.map_err(wavesplat_format::Error::Invalid)?;
+                }
+                None => codes.skip(&boxes),
+            }
+        }
+        Ok(codes)
+    }
+
     /// Decodes every k that `wanted` marks into the field. `codes` are all codes of the block, as
     /// [`Self::placed_boxes`] places them. Returns for each k whether some node is not zero; if k is refined, the same
     /// for all of them. The nodes of every other k are 0 or unspecified.
@@ -194,13 +222,14 @@ impl<'a> PredictionPasses<'a> {
         wanted: &[bool],
         step: f64,
         codes: &SparseCodes,
+        known: Option<Known<'_, R>>,
         field: &mut [R],
     ) -> Vec<bool> {
-        let marked = self.marked(codes);
+        let marked = self.marked(codes, known);
         let pyramids = field.chunks_exact_mut(self.pyramid_nodes());
         for ((number, nodes), wanted) in pyramids.enumerate().zip(wanted.chunks_exact(self.shape[3])) {
             if marked[number * self.shape[3]] && wanted.contains(&true) {
-                self.stages.refine(wanted, nodes, &mut self.sparse(number, step, codes, PARTS));
+                self.stages.refine(wanted, nodes, &mut self.sparse(number, step, codes, known, PARTS));
             } else {
                 nodes.fill(R::default());
             }
@@ -208,9 +237,10 @@ impl<'a> PredictionPasses<'a> {
         marked
     }
 
-    /// For each k, whether some code is not zero; if k is refined, the same for all of them.
-    pub(crate) fn marked(&self, codes: &SparseCodes) -> Vec<bool> {
-        let mut some = vec![false; self.pyramids];
+    /// For each k, whether some code or known node is not zero; if k is refined, the same for all of them.
+    pub(crate) fn marked<R: Real>(&self, codes: &SparseCodes, known: Option<Known<'_, R>>) -> Vec<bool> {
+        let is_known = |k: usize| known.is_some_and(|known| !known.is_zero(k * self.shape[3]..(k + 1) * self.shape[3]));
+        let mut some: Vec<bool> = (0..self.pyramids).map(is_known).collect();
         for (of, runs) in self.boxes.iter().zip(self.runs()).filter(|(of, _)| of.of.is_some()) {
             let each = (of.at.extents[3] / self.pyramids).max(1);
             runs.enumerate().for_each(|(n, run)| some[n / each] |= !codes.run(run).1.is_empty());
@@ -226,11 +256,18 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// As [`Self::decode_some`], for one k that is not refined with others. False if all its nodes are zero.
-    pub(crate) fn decode_one<R: Real>(&self, k: usize, step: f64, codes: &SparseCodes, nodes: &mut Vec<R>) -> bool {
-        let some = self.marked(codes)[k];
+    pub(crate) fn decode_one<R: Real>(
+        &self,
+        k: usize,
+        step: f64,
+        codes: &SparseCodes,
+        known: Option<Known<'_, R>>,
+        nodes: &mut Vec<R>,
+    ) -> bool {
+        let some = self.marked(codes, known)[k];
         if some {
             nodes.resize(self.pyramid_nodes(), R::default());
-            self.stages.refine(&[true], nodes, &mut self.sparse(k, step, codes, PARTS));
+            self.stages.refine(&[true], nodes, &mut self.sparse(k, step, codes, known, PARTS));
         }
         some
     }
@@ -240,14 +277,14 @@ impl<'a> PredictionPasses<'a> {
         self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
     }
 
-    /// Encodes the source's nodes, and fills the field with the decoded ones. The source has `size` nodes along x, y,
-    /// z, which may be more than are needed; `split` is scratch. NaN nodes get the code 0. False if a code does not
+    /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed;
+    /// `split` is scratch. NaN nodes get the code 0. False if a code does not
     /// fit. `codes` are in order, pass after pass.
     pub(crate) fn encode<R: Real>(
         &self,
         step: f64,
-        source: &[R],
-        size: [usize; 3],
+        source: Nodes<'_, R>,
+        known: Option<Known<'_, R>>,
         field: &mut [R],
         split: &mut Vec<R>,
         codes: &mut [i32],
@@ -255,11 +292,12 @@ impl<'a> PredictionPasses<'a> {
         let mut fits = true;
         let ranges: Vec<_> = (0..self.pyramids).map(|number| self.code_ranges(number)).collect();
         split.resize(self.codes() / self.pyramids, R::default());
-        let sources = source.chunks_exact(size.iter().product::<usize>() * self.shape[3]);
-        for ((nodes, source), ranges) in field.chunks_exact_mut(self.pyramid_nodes()).zip(sources).zip(&ranges) {
-            self.split(source, size, split);
-            let codes = apart(codes, ranges);
-            let mut encoding = Encoding { split, codes, passes: self.inverses(step), fits: true };
+        let sources = source.values.chunks_exact(source.size.iter().product::<usize>() * self.shape[3]);
+        let fields = field.chunks_exact_mut(self.pyramid_nodes());
+        for (number, ((nodes, values), ranges)) in fields.zip(sources).zip(&ranges).enumerate() {
+            self.split(values, source.size, split);
+            let (codes, known) = (apart(codes, ranges), known.map(|known| self.known(number, known)));
+            let mut encoding = Encoding { split, codes, passes: self.inverses(step), known, fits: true };
             self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);
             fits &= encoding.fits;
         }
@@ -284,14 +322,26 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// The change of a decoded field from leaving out each level part and all finer ones.
-    pub(crate) fn changes<R: Real>(&self, step: f64, codes: &SparseCodes, field: &[R]) -> Vec<Change> {
-        self.changes_without(&[true; PARTS], field, |number, parts| self.sparse(number, step, codes, parts))
+    pub(crate) fn changes<R: Real>(
+        &self,
+        step: f64,
+        codes: &SparseCodes,
+        known: Option<Known<'_, R>>,
+        field: &[R],
+    ) -> Vec<Change> {
+        self.changes_without(&[true; PARTS], field, |number, parts| self.sparse(number, step, codes, known, parts))
     }
 
     /// As [`Self::changes`], only for parts with a code that is not zero: the directory does not list others.
-    pub(crate) fn changes_of_coded<R: Real>(&self, step: f64, codes: &SparseCodes, field: &[R]) -> Vec<Change> {
+    pub(crate) fn changes_of_coded<R: Real>(
+        &self,
+        step: f64,
+        codes: &SparseCodes,
+        known: Option<Known<'_, R>>,
+        field: &[R],
+    ) -> Vec<Change> {
         let coded = std::array::from_fn(|part| self.count(part as u8, codes) > 0);
-        self.changes_without(&coded, field, |number, parts| self.sparse(number, step, codes, parts))
+        self.changes_without(&coded, field, |number, parts| self.sparse(number, step, codes, known, parts))
     }
 
     /// The changes from leaving out each part that `wanted` marks and all finer ones. `decoding(number, parts)` decodes a
@@ -307,7 +357,7 @@ impl<'a> PredictionPasses<'a> {
         let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
         for (number, nodes) in pyramids.filter(|(_, nodes)| !rows::is_zero(nodes)) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| wanted[*part]) {
-                if part == 0 {
+                if part == 0 && !self.has_known() {
                     dispatch!(add_changes_to_zero(change, nodes));
                 } else {
                     self.stages.refine(&vec![true; self.shape[3]], &mut rest, &mut decoding(number, part));
@@ -319,7 +369,14 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// Decodes a pyramid from its first parts.
-    fn sparse<'c, R: Real>(&self, number: usize, step: f64, codes: &'c SparseCodes, parts: usize) -> Decoding<'c, R> {
+    fn sparse<'c, R: Real>(
+        &self,
+        number: usize,
+        step: f64,
+        codes: &'c SparseCodes,
+        known: Option<Known<'c, R>>,
+        parts: usize,
+    ) -> Decoding<'c, R> {
         let steps = self.passes.iter().map(|pass| (self.step(step, pass), Vec::new()));
         let mut passes: Vec<(R, Vec<usize>)> = steps.collect();
         for (of, runs) in self.boxes.iter().zip(self.runs()).filter(|(of, _)| usize::from(of.part) < parts) {
@@ -327,7 +384,17 @@ impl<'a> PredictionPasses<'a> {
                 passes[pass].1.push(runs.start + number * (runs.len() / self.pyramids));
             }
         }
-        Decoding { codes, passes }
+        Decoding { codes, passes, known: known.map(|known| self.known(number, known)) }
+    }
+
+    /// The known nodes of the pyramid with this number.
+    fn known<'c, R: Real>(&self, number: usize, known: Known<'c, R>) -> KnownNodes<'c, R> {
+        KnownNodes::new(known, number * self.shape[3], &self.passes)
+    }
+
+    /// Whether the block begins with nodes of the block above.
+    fn has_known(&self) -> bool {
+        self.passes[0].is_known
     }
 
     fn step<R: Real>(&self, step: f64, pass: &Pass) -> R {

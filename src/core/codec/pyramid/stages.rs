@@ -134,10 +134,13 @@ impl Stages {
     /// `wanted` marks; others are unspecified.
     pub(super) fn refine<R: Real>(&self, wanted: &[bool], out: &mut [R], correction: &mut impl Correction<R>) {
         let needed = self.needed(wanted);
-        let mut coarse = Buffer::with_len(self.lattices[0].slice());
+        let first = &self.lattices[0];
+        let mut coarse = Buffer::with_len(first.slices * first.slice());
         coarse.fill(R::default());
-        correction.correct(0, 0, &mut coarse);
-        correction.complete(0, 0, &mut coarse);
+        for (n, slice) in coarse.chunks_exact_mut(first.slice()).enumerate() {
+            correction.correct(0, n * first.added, slice);
+            correction.complete(0, n, slice);
+        }
         let Some((last, others)) = self.stages.split_last() else { return out.copy_from_slice(&coarse) };
         for (stage, needed) in others.iter().zip(&needed) {
             let fine = &self.lattices[stage.ends()[1]];

@@ -4,7 +4,7 @@ use super::*;
 use wavesplat_format::{Packing, Stencil};
 
 /// The next of some scattered numbers below `end`.
-fn below(end: usize, state: &mut u64) -> usize {
+pub(super) fn below(end: usize, state: &mut u64) -> usize {
     *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     (*state >> 33) as usize % end
 }
@@ -16,7 +16,7 @@ fn some_pyramid(state: &mut u64) -> Pyramid {
     let packing = [Packing::Flat, Packing::Nested][below(2, state)];
     let ghosts = packing == Packing::Nested && below(2, state) == 0;
     let most = [1.0, 2.0, 9.0][below(3, state)];
-    Pyramid { order, stencil, growth: 1.5, most, single: false, packing, ghosts }
+    Pyramid { order, stencil, growth: 1.5, most, single: false, packing, ghosts, tiers: 0 }
 }
 
 fn some_shape(case: usize, state: &mut u64) -> [usize; 4] {
@@ -24,7 +24,7 @@ fn some_shape(case: usize, state: &mut u64) -> [usize; 4] {
 }
 
 /// Mostly zeros.
-fn some_codes(count: usize, state: &mut u64) -> Vec<i32> {
+pub(super) fn some_codes(count: usize, state: &mut u64) -> Vec<i32> {
     (0..count).map(|_| if below(3, state) == 0 { below(9, state) as i32 - 4 } else { 0 }).collect()
 }
 
@@ -91,7 +91,7 @@ fn twin(
     let outer = with_ghosts(pyramid, shape);
     let mut field = vec![f64::NAN; outer.iter().product()];
     let mut code = 0;
-    for pass in pyramid.passes([shape[0], shape[1], shape[2]], shape[3]) {
+    for pass in pyramid.passes([shape[0], shape[1], shape[2]], shape[3], 0) {
         for at in nodes_of(&pass, shape, outer) {
             field[index(outer, at)] = value((&pass, at), code, predicted(pyramid, &pass, outer, at, &field));
             code += 1;
@@ -107,11 +107,11 @@ fn nodes([x, y, z, k]: [usize; 4]) -> impl Iterator<Item = [usize; 4]> {
 
 /// The number of codes of a block.
 fn codes_in(pyramid: &Pyramid, shape: [usize; 4]) -> usize {
-    pyramid.passes([shape[0], shape[1], shape[2]], shape[3]).iter().map(Pass::codes).sum()
+    pyramid.passes([shape[0], shape[1], shape[2]], shape[3], 0).iter().map(Pass::codes).sum()
 }
 
 fn passes_of(pyramid: &Pyramid, [x, y, z, k]: [usize; 4]) -> PredictionPasses<'_> {
-    PredictionPasses::new(pyramid, [x, y, z], k)
+    PredictionPasses::new(pyramid, [x, y, z], k, 0)
 }
 
 fn twin_decoded(pyramid: &Pyramid, shape: [usize; 4], step: f64, codes: &[i32], parts: usize) -> Vec<f64> {
@@ -132,7 +132,7 @@ fn part_of(pyramid: &Pyramid, pass: &Pass, at: [usize; 4]) -> usize {
     }
 }
 
-fn bits(values: &[f64]) -> Vec<u64> {
+pub(super) fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
@@ -144,14 +144,14 @@ fn decoded_nodes_are_those_of_the_format() {
         let codes = some_codes(codes_in(&pyramid, shape), state);
         let passes = passes_of(&pyramid, shape);
         let mut field = vec![f64::NAN; shape.iter().product()];
-        let marked = passes.decode_some(&vec![true; shape[3]], 0.3, &passes.list(&codes), &mut field);
+        let marked = passes.decode_some(&vec![true; shape[3]], 0.3, &passes.list(&codes), None, &mut field);
         assert_eq!(bits(&field), bits(&twin_decoded(&pyramid, shape, 0.3, &codes, PARTS)), "{pyramid:?} {shape:?}");
         assert_eq!(passes.dense(&passes.list(&codes)), codes);
         for (k, nodes) in field.chunks_exact(shape[0] * shape[1] * shape[2]).enumerate() {
             assert!(marked[k] || nodes.iter().all(|v| *v == 0.0));
             if !pyramid.order.contains(&Axis::T) {
                 let mut one = Vec::new();
-                assert_eq!(passes.decode_one(k, 0.3, &passes.list(&codes), &mut one), marked[k]);
+                assert_eq!(passes.decode_one(k, 0.3, &passes.list(&codes), None, &mut one), marked[k]);
                 assert!(!marked[k] || bits(&one) == bits(nodes));
             }
         }
@@ -170,7 +170,7 @@ fn encoded_nodes_are_those_of_the_format() {
         let (mut split, mut codes) = (Vec::new(), vec![99; codes_in(&pyramid, shape)]);
         let mut field = vec![f64::NAN; shape.iter().product()];
         let size = [outer[0], outer[1], outer[2]];
-        assert!(passes.encode(0.7, &source, size, &mut field, &mut split, &mut codes));
+        assert!(passes.encode(0.7, Nodes { values: &source, size }, None, &mut field, &mut split, &mut codes));
         let mut expected = Vec::new();
         let decoded = twin(&pyramid, shape, |(pass, at), _, p| {
             let step = pyramid.step(0.7, pass.level);
@@ -181,8 +181,8 @@ fn encoded_nodes_are_those_of_the_format() {
         });
         assert_eq!(bits(&field), bits(&decoded), "{pyramid:?} {shape:?}");
         assert_eq!(codes, expected);
-        let coded = passes.changes_of_coded(0.7, &passes.list(&codes), &field);
-        let changes = passes.changes(0.7, &passes.list(&codes), &field);
+        let coded = passes.changes_of_coded(0.7, &passes.list(&codes), None, &field);
+        let changes = passes.changes(0.7, &passes.list(&codes), None, &field);
         for part in 0..PARTS {
             let rest = twin_decoded(&pyramid, shape, 0.7, &codes, part);
             let largest = rest.iter().zip(&field).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
@@ -204,12 +204,17 @@ fn codes_that_do_not_fit_are_noticed() {
         single: false,
         packing: Packing::Flat,
         ghosts: false,
+        tiers: 0,
     };
     let passes = passes_of(&pyramid, [3, 1, 1, 1]);
     for (largest, fits) in [(1e9, true), (2e9, false), (-1e9, true), (-2e9, false), (f64::INFINITY, false)] {
         let source = [0.0, largest, 1.0];
         let (field, split) = (&mut [0.0; 3], &mut Vec::new());
-        assert_eq!(passes.encode(1.0, &source, [3, 1, 1], field, split, &mut [0; 3]), fits, "{largest}");
+        assert_eq!(
+            passes.encode(1.0, Nodes { values: &source, size: [3, 1, 1] }, None, field, split, &mut [0; 3]),
+            fits,
+            "{largest}"
+        );
     }
 }
 
@@ -227,7 +232,7 @@ fn coarse_lattices_have_the_nodes_of_all_passes() {
         let decoded = twin_decoded(&pyramid, shape, 0.3, &codes, PARTS);
         let whole = passes_of(&pyramid, shape);
         for lod in 1..4 {
-            let passes = PredictionPasses::with_detail(&pyramid, [shape[0], shape[1], shape[2]], shape[3], lod);
+            let passes = PredictionPasses::with_detail(&pyramid, [shape[0], shape[1], shape[2]], shape[3], 0, lod);
             let mut read = SparseCodes::default();
             let needed = crate::codec::coarsest_part(&pyramid, lod);
             for part in 0..Pyramid::PARTS {
@@ -242,7 +247,7 @@ fn coarse_lattices_have_the_nodes_of_all_passes() {
             passes.thin(&mut read);
             let [x, y, z, k] = passes.nodes();
             let mut coarse = vec![f64::NAN; x * y * z * k];
-            passes.decode_some(&vec![true; k], 0.3, &read, &mut coarse);
+            passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse);
             for (i, found) in coarse.iter().enumerate() {
                 let at = [i % x, i / x % y, i / (x * y) % z].map(|node| node << lod);
                 let k = i / (x * y * z);
@@ -265,8 +270,8 @@ fn some_ks_have_the_nodes_of_all_passes() {
         let passes = passes_of(&pyramid, [x, y, z, k]);
         let wanted: Vec<bool> = (0..k).map(|_| below(8, state) == 0).collect();
         let (mut some, sparse) = (vec![f64::NAN; x * y * z * k], passes.list(&codes));
-        let marked = passes.decode_some(&wanted, 0.3, &sparse, &mut some);
-        assert_eq!(marked, passes.marked(&sparse));
+        let marked = passes.decode_some(&wanted, 0.3, &sparse, None, &mut some);
+        assert_eq!(marked, passes.marked::<f64>(&sparse, None));
         let whole = twin_decoded(&pyramid, [x, y, z, k], 0.3, &codes, PARTS);
         let of_k = |nodes: &[f64], k: usize| bits(&nodes[k * x * y * z..][..x * y * z]);
         for k in 0..k {

@@ -1,0 +1,109 @@
+//! The nodes with which a block below the last tier begins: those of the block above that lie in it (eq 44).
+
+use crate::codec::real::Real;
+use crate::codec::rows;
+use std::ops::Range;
+use wavesplat_format::{Axis, Pass};
+
+/// Nodes of a lattice, `[k][z][y][x]`, x fastest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Nodes<'a, R> {
+    /// Their values; empty if all are zero.
+    pub(crate) values: &'a [R],
+    /// Their number along x, y, z.
+    pub(crate) size: [usize; 3],
+}
+
+/// The nodes of the block above, and the first of them that lies in the block.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known<'a, R> {
+    pub(crate) nodes: Nodes<'a, R>,
+    pub(crate) start: [usize; 3],
+}
+
+impl<R: Real> Known<'_, R> {
+    /// Whether all nodes of some k are zero.
+    pub(super) fn is_zero(&self, ks: Range<usize>) -> bool {
+        let each: usize = self.nodes.size.iter().product();
+        rows::is_zero(self.nodes.values.get(ks.start * each..ks.end * each).unwrap_or_default())
+    }
+
+    /// A row of nodes, from the `x`-th in the block on.
+    fn row(&self, k: usize, [y, z]: [usize; 2]) -> &[R] {
+        let [nx, ny, nz] = self.nodes.size;
+        let [x, of_y, of_z] = self.start;
+        let first = x + nx * (of_y + y + ny * (of_z + z + nz * k));
+        self.nodes.values.get(first..).unwrap_or_default()
+    }
+
+    /// Copies the nodes of some k in a block of `size` nodes.
+    pub(crate) fn copy(&self, [nx, ny, nz]: [usize; 3], ks: Range<usize>, out: &mut [R]) {
+        for (n, to) in out[..nx * ny * nz * ks.len()].chunks_exact_mut(nx).enumerate() {
+            put(self.row(ks.start + n / (ny * nz), [n % ny, n / ny % nz]), 1, to);
+        }
+    }
+}
+
+/// The known nodes on the lattices of one pyramid's passes.
+#[derive(Debug)]
+pub(super) struct KnownNodes<'a, R> {
+    known: Known<'a, R>,
+    /// The k of the pyramid's first nodes.
+    first: usize,
+    passes: Vec<Option<Place>>,
+}
+
+/// Where known nodes lie on the lattice after a pass.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    /// Nodes of the lattice along x, y, z.
+    extents: [usize; 3],
+    /// Every how many of these is known.
+    every: [usize; 3],
+    /// The first frame that the pass adds, and the distance to the next.
+    frames: (usize, usize),
+}
+
+impl Place {
+    fn new(pass: &Pass) -> Option<Self> {
+        let [x, y, z, _] = pass.lattice();
+        let every = |a: usize| if pass.is_known { 1 } else { (2 / pass.strides[a]).max(1) };
+        let place = Self { extents: [x, y, z], every: std::array::from_fn(every), frames: pass.nodes(3) };
+        (pass.is_known || pass.axis == Some(Axis::T)).then_some(place)
+    }
+}
+
+impl<'a, R: Real> KnownNodes<'a, R> {
+    pub(super) fn new(known: Known<'a, R>, first: usize, passes: &[Pass]) -> Self {
+        Self { known, first, passes: passes.iter().map(Place::new).collect() }
+    }
+
+    /// Gives the known nodes in the `slice`-th of the slices that a pass adds their values, and calls `found` with each row of them:
+    /// its first place, the distance of nodes, and their number.
+    pub(super) fn restore(
+        &self,
+        pass: usize,
+        slice: usize,
+        nodes: &mut [R],
+        mut found: impl FnMut(usize, usize, usize),
+    ) {
+        let Some(Place { extents: [nx, ny, nz], every: [of_x, of_y, of_z], frames }) = self.passes[pass] else {
+            return;
+        };
+        let k = self.first + frames.0 + slice * frames.1;
+        for (z, y) in (0..nz).step_by(of_z).flat_map(|z| (0..ny).step_by(of_y).map(move |y| (z, y))) {
+            let at = nx * (y + ny * z);
+            put(self.known.row(k, [y / of_y, z / of_z]), of_x, &mut nodes[at..][..nx]);
+            found(at, of_x, nx.div_ceil(of_x));
+        }
+    }
+}
+
+/// Copies a row to every n-th place of another. A row that is too short continues with zeros.
+fn put<R: Real>(from: &[R], n: usize, to: &mut [R]) {
+    if n == 1 && from.len() >= to.len() {
+        return to.copy_from_slice(&from[..to.len()]);
+    }
+    let from = from.iter().copied().chain(std::iter::repeat(R::default()));
+    to.iter_mut().step_by(n).zip(from).for_each(|(to, from)| *to = from);
+}

@@ -1,0 +1,246 @@
+//! Compares blocks of tiers with a slow twin that follows `FORMAT.md`, section 8, node by node, in the positions of voxels.
+
+use super::tests::{below, bits, some_codes};
+use super::*;
+use std::collections::HashMap;
+use wavesplat_format::{Packing, Stencil};
+
+type Node = [usize; 4];
+
+/// A block of some tier.
+struct Case {
+    pyramid: Pyramid,
+    size: [usize; 3],
+    ks: usize,
+    tier: u8,
+}
+
+impl Case {
+    fn random(state: &mut u64) -> Self {
+        let orders: [&[Axis]; 5] = [
+            &[Axis::X, Axis::Y, Axis::Z],
+            &[Axis::Z, Axis::X, Axis::Y, Axis::T],
+            &[Axis::T, Axis::Y, Axis::Z, Axis::X],
+            &[Axis::X, Axis::Y, Axis::T, Axis::Z],
+            &[Axis::Y, Axis::T, Axis::X, Axis::Z],
+        ];
+        let stencil = [Stencil::Linear, Stencil::Cubic][below(2, state)];
+        let (order, ghosts) = (orders[below(5, state)].to_vec(), below(3, state) > 0);
+        let (tiers, packing) = (1 + below(3, state) as u8, Packing::Nested);
+        let pyramid = Pyramid { order, stencil, growth: 1.5, most: 2.0, single: false, packing, ghosts, tiers };
+        let tier = below(usize::from(tiers) + 1, state) as u8;
+        let size = std::array::from_fn(|_| 1 + below(9 << tier, state));
+        Self { pyramid, size, ks: 1 + below([3, 9, 20][below(3, state)], state), tier }
+    }
+
+    fn passes(&self) -> PredictionPasses<'_> {
+        PredictionPasses::new(&self.pyramid, self.size, self.ks, self.tier)
+    }
+
+    fn is_last(&self) -> bool {
+        self.tier == self.pyramid.tiers
+    }
+
+    /// The extents with ghost nodes.
+    fn outer(&self) -> Node {
+        let ghost = |n: usize| n + usize::from(self.pyramid.ghosts && n.is_multiple_of(2));
+        let [x, y, z] = self.size.map(ghost);
+        [x, y, z, self.ks]
+    }
+
+    /// All nodes on a lattice, in the order of node numbers.
+    fn lattice(&self, first: Node, distance: Node, ends: Node) -> Vec<Node> {
+        let along = |a: usize| (first[a]..ends[a]).step_by(distance[a]);
+        let mut nodes = Vec::new();
+        for k in along(3) {
+            for z in along(2) {
+                for y in along(1) {
+                    nodes.extend(along(0).map(|x| [x, y, z, k]));
+                }
+            }
+        }
+        nodes
+    }
+
+    /// The nodes of the block's tier.
+    fn all(&self) -> Vec<Node> {
+        let (n, [x, y, z]) = (1 << self.tier, self.size);
+        self.lattice([0; 4], [n, n, n, 1], if self.tier == 0 { [x, y, z, self.ks] } else { self.outer() })
+    }
+
+    /// Whether the block above has a node.
+    fn is_known(&self, [x, y, z, _]: Node) -> bool {
+        !self.is_last() && [x, y, z].iter().all(|at| at.is_multiple_of(2 << self.tier))
+    }
+
+    /// The passes: level, axis, first nodes, their distances and the ends of the lattice.
+    fn listed(&self) -> Vec<(u32, Option<usize>, Node, Node, Node)> {
+        let (outer, [x, y, z], tier) = (self.outer(), self.size, u32::from(self.tier));
+        let order: Vec<usize> = self.pyramid.order.iter().map(|axis| axis.index()).collect();
+        let mut levels = u32::from(self.pyramid.tiers);
+        order.iter().for_each(|a| levels = levels.max(outer[*a].next_power_of_two().ilog2()));
+        let mut strides = [1; 4];
+        order.iter().for_each(|a| strides[*a] = 1 << levels);
+        let least = [1 << tier, 1 << tier, 1 << tier, 1];
+        let ends = |strides: Node| {
+            let inner = [x, y, z, self.ks];
+            std::array::from_fn(|a| if strides[a] > 1 || self.tier > 0 { outer[a] } else { inner[a] })
+        };
+        let mut found = Vec::new();
+        if self.is_last() {
+            found.push((levels, None, [0; 4], strides, ends(strides)));
+        }
+        let mut has_begun = self.is_last();
+        for (level, axis) in (0..levels).rev().flat_map(|level| order.iter().map(move |axis| (level, *axis))) {
+            strides[axis] = 1 << level;
+            let is_own = if axis == 3 { has_begun } else { level == tier || self.is_last() && level > tier };
+            has_begun |= axis < 3 && level <= tier; // also where the block is too small for the pass
+            if is_own && outer[axis] > 1 << level {
+                let mut distance: Node = std::array::from_fn(|a| strides[a].max(least[a]));
+                let mut first = [0; 4];
+                (first[axis], distance[axis]) = (1 << level, 2 << level);
+                found.push((level, Some(axis), first, distance, ends(strides)));
+            }
+        }
+        found
+    }
+
+    /// The values of all nodes; `value(level, node, number of the code, prediction)` is that of an own node.
+    fn twin(&self, known: &HashMap<Node, f64>, mut value: impl FnMut(u32, Node, usize, f64) -> f64) -> Vec<f64> {
+        let (mut field, mut code) = (known.clone(), 0);
+        for (level, axis, first, distance, ends) in self.listed() {
+            for node in self.lattice(first, distance, ends) {
+                if !self.is_known(node) {
+                    let predicted = axis.map_or(0.0, |axis| self.predicted(level, axis, node, &field));
+                    field.insert(node, value(level, node, code, predicted));
+                }
+                code += 1;
+            }
+        }
+        self.all().iter().map(|node| field[node]).collect()
+    }
+
+    fn predicted(&self, level: u32, axis: usize, node: Node, field: &HashMap<Node, f64>) -> f64 {
+        let distance = 2 << level;
+        let (n, i) = (self.outer()[axis].div_ceil(distance), node[axis] / distance);
+        let e = |i: usize| {
+            let mut at = node;
+            at[axis] = i * distance;
+            field[&at]
+        };
+        match n {
+            1 => e(0),
+            _ if i == n - 1 => -0.5 * e(i - 1) + 1.5 * e(i),
+            _ if n == 2 || self.pyramid.stencil == Stencil::Linear => 0.5 * e(i) + 0.5 * e(i + 1),
+            _ if i == 0 => 0.375 * e(0) + 0.75 * e(1) + -0.125 * e(2),
+            _ if i == n - 2 => -0.125 * e(i - 1) + 0.75 * e(i) + 0.375 * e(i + 1),
+            _ => -0.0625 * e(i - 1) + 0.5625 * e(i) + 0.5625 * e(i + 1) + -0.0625 * e(i + 2),
+        }
+    }
+
+    /// A block above with random nodes, in which the block begins at `start`: its nodes and size, and those that the block has.
+    fn above(&self, start: [usize; 3], state: &mut u64) -> (Vec<f64>, [usize; 3], HashMap<Node, f64>) {
+        let (n, outer) = (2 << self.tier, self.outer());
+        let size = std::array::from_fn(|a| start[a] + outer[a].div_ceil(n) + below(3, state));
+        let [nx, ny, nz] = size;
+        let nodes: Vec<f64> = (0..nx * ny * nz * self.ks).map(|_| below(1000, state) as f64 / 9.0).collect();
+        let at =
+            |[x, y, z, k]: Node| nodes[start[0] + x / n + nx * (start[1] + y / n + ny * (start[2] + z / n + nz * k))];
+        let known = self.lattice([0; 4], [n, n, n, 1], outer).into_iter().map(|node| (node, at(node))).collect();
+        (nodes, size, if self.is_last() { HashMap::new() } else { known })
+    }
+}
+
+#[test]
+fn blocks_of_tiers_decode_as_the_format_says() {
+    let state = &mut 17;
+    for _ in 0..3000 {
+        let case = Case::random(state);
+        let start = std::array::from_fn(|_| below(4, state));
+        let (nodes, size, known) = case.above(start, state);
+        let of = (!case.is_last()).then_some(Known { nodes: Nodes { values: &nodes, size }, start });
+        let passes = case.passes();
+        let listed = passes.list(&some_codes(passes.codes(), state));
+        let codes = passes.dense(&listed);
+        let mut field = vec![f64::NAN; passes.nodes().iter().product()];
+        passes.decode_some(&vec![true; case.ks], 0.3, &listed, of, &mut field);
+        let twin = case.twin(&known, |level, _, code, p| p + f64::from(codes[code]) * case.pyramid.step(0.3, level));
+        let what = format!("{:?} {:?} {} {}", case.pyramid, case.size, case.ks, case.tier);
+        assert_eq!(bits(&field), bits(&twin), "{what}");
+        if !case.pyramid.order.contains(&Axis::T) {
+            let each = field.len() / case.ks;
+            for (k, all) in field.chunks_exact(each).enumerate() {
+                let mut one = Vec::new();
+                assert!(!passes.decode_one(k, 0.3, &listed, of, &mut one) || bits(&one) == bits(all), "{what} {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn blocks_of_tiers_are_encoded_as_the_format_says() {
+    let state = &mut 19;
+    for _ in 0..2000 {
+        let case = Case::random(state);
+        let start = std::array::from_fn(|_| below(4, state));
+        let (nodes, size, known) = case.above(start, state);
+        let of = (!case.is_last()).then_some(Known { nodes: Nodes { values: &nodes, size }, start });
+        let passes = case.passes();
+        let n = 1 << case.tier;
+        let [x, y, z, _] = case.outer().map(|extent| extent.div_ceil(n));
+        let source: Vec<f64> = (0..x * y * z * case.ks).map(|_| below(1000, state) as f64 / 70.0).collect();
+        let (mut split, mut codes) = (Vec::new(), vec![99; passes.codes()]);
+        let mut field = vec![f64::NAN; passes.nodes().iter().product()];
+        let of_source = Nodes { values: &source, size: [x, y, z] };
+        assert!(passes.encode(0.7, of_source, of, &mut field, &mut split, &mut codes));
+        let mut expected = vec![0; codes.len()];
+        let twin = case.twin(&known, |level, [i, j, l, k], code, p| {
+            let step = case.pyramid.step(0.7, level);
+            let q = ((source[i / n + x * (j / n + y * (l / n + z * k))] - p) * (1.0 / step)).round_ties_even();
+            expected[code] = q as i32;
+            p + q * step
+        });
+        assert_eq!(bits(&field), bits(&twin));
+        assert_eq!(codes, expected);
+        assert_eq!(passes.dense(&passes.list(&codes)), codes);
+    }
+}
+
+/// Lattices that are coarser than the last tier come from its first parts.
+#[test]
+fn coarse_lattices_of_the_last_tier_have_the_nodes_of_all_passes() {
+    let state = &mut 23;
+    for _ in 0..1000 {
+        let mut case = Case::random(state);
+        case.tier = case.pyramid.tiers;
+        let whole = case.passes();
+        let listed = whole.list(&some_codes(whole.codes(), state));
+        let codes = whole.dense(&listed);
+        let [nx, ny, nz, ks] = whole.nodes();
+        let mut field = vec![f64::NAN; nx * ny * nz * ks];
+        whole.decode_some(&vec![true; ks], 0.3, &listed, None, &mut field);
+        for lod in 1..4 {
+            let passes = PredictionPasses::with_detail(&case.pyramid, case.size, ks, case.tier, lod);
+            let (mut read, mut raw) = (SparseCodes::default(), Vec::new());
+            let needed = crate::codec::coarsest_part(&case.pyramid, lod);
+            for part in 0..Pyramid::PARTS {
+                raw.clear();
+                Packing::Nested.pack(&whole.part_of(part, &codes), &mut raw);
+                if usize::from(part) <= needed {
+                    Packing::Nested.unpack(&raw, &passes.placed_boxes(part), &mut read).expect("packed");
+                } else {
+                    read.skip(&passes.placed_boxes(part));
+                }
+            }
+            passes.thin(&mut read);
+            let [x, y, z, k] = passes.nodes();
+            let mut coarse = vec![f64::NAN; x * y * z * k];
+            passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse);
+            for (i, found) in coarse.iter().enumerate() {
+                let at = [i % x, i / x % y, i / (x * y) % z].map(|node| node << lod);
+                let expected = field[at[0] + nx * (at[1] + ny * (at[2] + nz * (i / (x * y * z))))];
+                assert_eq!(found.to_bits(), expected.to_bits(), "{:?} {:?} {lod} {at:?}", case.pyramid, case.size);
+            }
+        }
+    }
+}
