@@ -156,7 +156,7 @@ impl Trial {
         let codec = self.file.codec(window).unwrap();
         let mut found = self.found.clone(); // right for missing and exact samples
         for leaf in self.file.leaves(window) {
-            for entry in self.file.leaf(leaf).unwrap() {
+            for entry in self.file.leaf(leaf).unwrap().into_iter().filter(|entry| entry.id.tier == 0) {
                 let places = self.places(&codec, window, entry.id.block);
                 assert!(!self.of_samples() || entry.stats.reached <= codec.bound.delta);
                 let block = self.file.block(&codec, &entry, &vec![true; codec.basis.coefficients()]).unwrap();

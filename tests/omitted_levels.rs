@@ -39,6 +39,7 @@ fn a_part_states_the_exact_change_if_it_and_finer_parts_are_omitted() {
             let file = stored(&mut Memory::new(grid, ty, bytes(ty, &samples)), &config).open();
             let codec = file.codec(0).unwrap();
             for entry in entries(&file) {
+                let codec = codec.at(entry.id.tier, 0);
                 let whole = coefficients(&file, &codec, &entry, u8::MAX);
                 for part in &entry.parts {
                     let PartKind::Level(level) = part.kind else { continue };

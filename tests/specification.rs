@@ -194,6 +194,9 @@ impl<'a> Seen<'a> {
             return codes.iter().map(|q| f64::from(*q) * self.block.step).collect();
         };
         let (tier, (start, extents)) = (self.id.tier, self.boxed(self.id));
+        if tier == 0 && self.window.tiers() > 0 && self.block.step == 0.0 {
+            return vec![0.0; extents.iter().product()];
+        }
         let all: Vec<_> = pyramid.passes(extents, tier);
         let count = all.iter().map(|pass| pyramid.added(*pass, extents, tier).count()).sum();
         let zeros = vec![0; count];

@@ -61,6 +61,12 @@ impl BlockEntry {
         self.part(PartKind::Exact).is_some()
     }
 
+    /// Whether it begins with the nodes of the block above, in a window with so many tiers. Without a step, all samples of a
+    /// block of tier 0 are zero.
+    pub fn begins_above(&self, tiers: u8) -> bool {
+        self.id.tier < tiers && !self.is_exact() && (self.id.tier > 0 || self.stats.step > 0.0)
+    }
+
     /// Bytes of its parts in the file, without header and padding.
     pub fn stored_len(&self) -> u64 {
         self.parts.iter().map(|part| u64::from(part.stored_len)).sum()
@@ -124,6 +130,15 @@ impl BlockEntry {
         let lost = !self.lost || self.encoded() == Self::lost(self.id).encoded();
         ensure(lost, || "a lost block with parts or statistics".into())?;
         self.parts.iter().try_for_each(PartEntry::check)
+    }
+
+    /// Checks what only blocks of a window with tiers must satisfy.
+    pub(crate) fn check_tier(&self, tiers: u8) -> ParseResult {
+        let nothing = BlockStats { step: self.stats.step, ..Self::lost(self.id).stats };
+        ensure(self.id.tier == 0 || self.stats == nothing, || "errors or a value range without samples".into())?;
+        let is_coded = self.parts.iter().any(|part| matches!(part.kind, PartKind::Level(_)));
+        let has_step = self.id.tier > 0 || tiers == 0 || self.stats.step > 0.0;
+        ensure(has_step || !is_coded, || "coefficients without a step".into())
     }
 
     /// Checks that the parts of a block at `start` follow its header without a gap; returns its aligned end.

@@ -504,6 +504,8 @@ def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int) -
         empty = b.min == math.inf and b.reached == b.squared_error == b.dropped == 0
         need(empty, place, "range or errors, but no samples of its own")
         need(all(p.kind == LEVEL for p in b.parts), place, "parts that are no levels in a tier above 0")
+    if not b.tier and w.tiers and not b.step:
+        need(all(p.kind != LEVEL for p in b.parts), place, "levels without a step")
     keys = [(p.kind, p.level) for p in b.parts]
     need(all(k < l for k, l in zip(keys, keys[1:])), place, "parts do not ascend")
     need(not b.exact or all(p.kind in (MISSING, EXACT) for p in b.parts), place, "exact beside levels or outliers")
@@ -1385,6 +1387,8 @@ class Archive:
     def _lattice(self, b: Block, w: Window, levels: dict) -> np.ndarray:
         """The nodes of a block [k, z, y, x], ghost nodes included."""
         p, extents, codes = w.pyramid, (*self._size(b), w.coefficients), {}
+        if not b.tier and p.tiers and not b.step:
+            return np.zeros(p.lattice(extents, 0)[::-1])
         for level, (part, data) in levels.items():
             mine = [box for box in boxes(extents, p, b.tier) if box.part == level]
             place = f"{b.place}, level {level}"

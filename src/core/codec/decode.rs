@@ -260,6 +260,11 @@ impl Block {
         self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact
     }
 
+    /// Whether all coefficients are zero.
+    pub fn is_zero(&self) -> bool {
+        self.codes.is_empty() && self.above.is_none()
+    }
+
     /// Whether any sample is stored exactly, and overrides the coefficients.
     pub fn overrides(&self) -> bool {
         !(self.outliers.positions.is_empty() && self.missing.0.is_empty())

@@ -96,7 +96,7 @@ impl Encoder {
     }
 
     /// Encodes a block of a tier above 0 that covers `size` voxels, and returns its decoded nodes for the blocks below. `of` are its
-    /// nodes, and `samples` those that [`BlockWithGhosts::coarse`] makes them from.
+    /// nodes, and `samples` those that `BlockWithGhosts::coarse` makes them from.
     pub fn coarse(
         &mut self,
         codec: &WindowCodec,

@@ -1,7 +1,7 @@
 //! Bounds on how far omitted level parts can move a sample: the gain of eq 25, restricted to the omitted parts.
 
 use super::WindowCodec;
-use super::scheme::{Axis, Pyramid};
+use super::scheme::{Axis, Pyramid, Stencil};
 use std::ops::Range;
 
 impl WindowCodec {
@@ -16,6 +16,19 @@ impl WindowCodec {
         } else {
             self.levels.iter().cloned().map(of_part).collect()
         }
+    }
+
+    /// The largest coefficient that predictions give a block that begins with nodes of at most 1: the sum of absolute weights of eq
+    /// 33, pass after pass.
+    pub fn prediction_gain(&self) -> f64 {
+        let Some(pyramid) = &self.scheme.pyramid else { return 1.0 };
+        let in_space: f64 = match (pyramid.ghosts, pyramid.stencil) {
+            (false, _) => 2.0, // the last node is extrapolated
+            (true, Stencil::Cubic) => 1.25,
+            (true, Stencil::Linear) => 1.0,
+        };
+        let along_time = if pyramid.order.contains(&Axis::T) { 2_u64 << pyramid.tiers } else { 1 };
+        in_space * in_space * in_space * along_time as f64
     }
 
     /// For each level part, the largest sum of squared samples that a coefficient of 1 causes. It can differ from 1

@@ -85,6 +85,9 @@ impl Source<'_> {
         clear(codes).resize(passes.codes(), 0);
         field.resize(passes.nodes().iter().product(), R::default());
         let weighing = QuantizerSetup::new(self.codec, self.samples, self.missing.magnitude)?;
+        if let Some(zero) = self.zero(&weighing, &passes, field) {
+            return Some(zero);
+        }
         let mut step = self.step::<R>(pyramid, &weighing)?;
         outer.load(&weighing, source);
         let mut encode = |step| {
@@ -111,6 +114,26 @@ impl Source<'_> {
         let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })
+    }
+
+    /// The block with zeros in place of the nodes above and its own, if its samples are within the bound of that.
+    fn zero<R: Real>(
+        &self,
+        weighing: &QuantizerSetup,
+        passes: &PredictionPasses<'_>,
+        field: &mut [R],
+    ) -> Option<Coded> {
+        let magnitude = self.missing.magnitude;
+        let is_small = self.codec.tier == 0 && magnitude <= self.codec.bound.allowed(magnitude);
+        if self.codec.tiers() == 0 || !is_small {
+            return None;
+        }
+        field.fill(R::default());
+        let codes = vec![0; passes.codes()];
+        let tally = self.checked(weighing, passes, None, field, &codes).tally?;
+        let parts = Some(vec![PartStats { count: 0, energy: 0.0, largest: 0.0 }; self.codec.parts()]);
+        let (dropped, outliers) = (tally.squared_error, Outliers::default());
+        tally.outliers.is_empty().then_some(Coded { step: 0.0, parts, dropped, outliers, tally })
     }
 
     /// Compares the field that codes give with the source.

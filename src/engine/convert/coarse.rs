@@ -18,18 +18,16 @@ pub(super) struct CoarseBlocks {
 }
 
 impl CoarseBlocks {
-    /// Room for so many bytes of decoded blocks.
-    pub(super) fn new(room: usize) -> Self {
-        Self { coded: Mutex::default(), decoded: AboveBlocks::new(room) }
+    /// Room for so many decoded blocks.
+    pub(super) fn new(most: usize) -> Self {
+        Self { coded: Mutex::default(), decoded: AboveBlocks::new(most) }
     }
 
     /// Adds a coded block and its decoded nodes.
-    pub(super) fn add(&self, plan: &Plan<'_>, codec: &WindowCodec, block: &EncodedBlock, field: Field<'static>) {
+    pub(super) fn add(&self, codec: &WindowCodec, block: &EncodedBlock, field: Field<'static>) {
         let (id, all) = (block.id, vec![true; codec.basis.coefficients()]);
         self.coded.lock().unwrap_or_else(PoisonError::into_inner).insert(id, Arc::new(block.clone()));
-        let place = PlaceAbove::new(&plan.start, codec, id, id.tier, 0);
-        let key = AboveKey { id, lod: 0, wanted: all };
-        _ = self.decoded.field(key, place.bytes(codec), || Ok(Arc::new(field)));
+        _ = self.decoded.field(AboveKey { id, lod: 0, wanted: all }, || Ok(Arc::new(field)));
     }
 
     /// The nodes of the block above a block; none in the last tier.
@@ -48,7 +46,7 @@ impl CoarseBlocks {
             let block = Block::from_encoded(&codec, &coded, plan.size(place.id), above).map_err(super::bug)?;
             Ok(Arc::new(block.refined(&codec, &all)))
         };
-        let field = self.decoded.field(key, place.bytes(codec), decode)?;
+        let field = self.decoded.field(key, decode)?;
         Ok(Some(place.with(field)))
     }
 }

@@ -75,9 +75,6 @@ pub(super) fn read(
     Ok((busy, reader.findings))
 }
 
-/// This share of the memory has decoded blocks above others.
-const ABOVE_SHARE: usize = 8;
-
 /// The samples that a scheme is chosen from are divided by this, if it need not be the best.
 const ROUGH: usize = 4;
 
@@ -267,7 +264,7 @@ impl<'a> WindowReader<'a> {
         let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        let coarse = CoarseBlocks::new(self.config.memory / ABOVE_SHARE);
+        let coarse = CoarseBlocks::new(self.plan.kept_above);
         let (features, digest) = (self.features, scan.digest);
         Ok(WindowJob { index, first_frame, id, features, codec, coarse, range, digest, times })
     }

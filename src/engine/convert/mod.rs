@@ -424,7 +424,7 @@ fn encode_block(
     let nodes = plan.coarse_nodes(&codec, id);
     let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
     let (block, field) = coded.map_err(bug)?;
-    window.coarse.add(plan, &codec, &block, field);
+    window.coarse.add(&codec, &block, field);
     Ok(Encoded { block, share: 0.0 })
 }
 

@@ -23,6 +23,8 @@ pub(super) struct Plan<'a> {
     pub(super) blocks: BlockGrid,
     /// Blocks that are gathered, encoded and written together.
     pub(super) batch: usize,
+    /// The number of blocks above others that stay decoded.
+    pub(super) kept_above: usize,
 }
 
 /// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
@@ -79,17 +81,12 @@ impl<'a> Plan<'a> {
 
     /// The blocks of a tier.
     pub(super) fn blocks_of_tier(&self, tier: u8) -> BlockGrid {
-        BlockGrid::cubes(self.blocks.dims, self.blocks.edges[0] << tier)
+        blocks_of_tier(self.blocks, tier)
     }
 
     /// The least number of tiers for which the last has one block; 0 if blocks cannot be halved, or tiers are not written.
     pub(super) fn tiers(&self) -> u8 {
-        if !WRITES_TIERS {
-            return 0;
-        }
-        let is_one = |tier: &u8| self.blocks_of_tier(*tier).len() == 1;
-        let is_even = self.blocks.edges[0].is_multiple_of(2);
-        (0..wavesplat_format::limits::MAX_TIERS).find(is_one).filter(|_| is_even).unwrap_or(0)
+        tiers(self.blocks)
     }
 
     /// The nodes of a block of a tier above 0, and how many samples along x, y, z they are made from.
@@ -131,8 +128,10 @@ impl<'a> Plan<'a> {
                 format!("{edge} voxels a side give more than 2^32 blocks; take larger ones"),
             ));
         }
-        let batch = batch_len(input, blocks)?;
-        Ok(Self { start: start(input, edge), colour_transform: colour_transform.as_ref(), blocks, batch })
+        let kept_above = kept_above(input, blocks);
+        let batch = batch_len(input, blocks, kept_above)?;
+        let start = start(input, edge);
+        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, batch, kept_above })
     }
 
     /// The plan of a file that has `count` blocks, side by side along the longest axis.
@@ -157,6 +156,29 @@ impl<'a> Plan<'a> {
     pub(super) fn blocks_of_window(&self) -> usize {
         self.blocks.len() * self.channels()
     }
+}
+
+/// The blocks of a tier above these.
+fn blocks_of_tier(blocks: BlockGrid, tier: u8) -> BlockGrid {
+    BlockGrid::cubes(blocks.dims, blocks.edges[0] << tier)
+}
+
+/// As [`Plan::tiers`].
+fn tiers(blocks: BlockGrid) -> u8 {
+    let is_one = |tier: &u8| blocks_of_tier(blocks, *tier).len() == 1;
+    let is_even = WRITES_TIERS && blocks.edges[0].is_multiple_of(2);
+    (0..wavesplat_format::limits::MAX_TIERS).find(is_one).filter(|_| is_even).unwrap_or(0)
+}
+
+/// Bytes of the decoded nodes of a block above others.
+fn bytes_above(input: &CodedInput, blocks: BlockGrid) -> usize {
+    let nodes: usize = blocks.region(0).dims().iter().map(|n| n + 1).product();
+    if tiers(blocks) == 0 { 0 } else { nodes * most_coefficients(&input.config) * size_of::<f64>() }
+}
+
+/// The number of blocks above others that stay decoded: as many as fit in an eighth of the memory, at least one.
+fn kept_above(input: &CodedInput, blocks: BlockGrid) -> usize {
+    (input.config.memory / 8).checked_div(bytes_above(input, blocks)).map_or(0, |count| count.max(1))
 }
 
 /// Checks that the tolerance or error is valid for this bound and these samples.
@@ -209,7 +231,7 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
 
 /// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
 /// workers' scratch, and what choosing the next window's scheme takes.
-fn batch_len(input: &CodedInput, blocks: BlockGrid) -> Result<usize> {
+fn batch_len(input: &CodedInput, blocks: BlockGrid, kept_above: usize) -> Result<usize> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
@@ -221,9 +243,15 @@ fn batch_len(input: &CodedInput, blocks: BlockGrid) -> Result<usize> {
     let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // no pyramid is tried then
     let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
     let choice = if alone { 0 } else { choose::bytes(samples, sample) };
-    let scratch = samples + 2 * codes + field + raw + channel_bytes + ZSTD_SCRATCH;
-    let needs =
-        |batch: &usize| batch * 4 * raw + batch.min(&rayon::current_num_threads()) * scratch + choice + memory::FIXED;
+    let above = bytes_above(input, blocks); // beside those that stay decoded
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + above + ZSTD_SCRATCH;
+    let needs = |batch: &usize| {
+        batch * 4 * raw
+            + batch.min(&rayon::current_num_threads()) * scratch
+            + choice
+            + kept_above * above
+            + memory::FIXED
+    };
     let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // recent memory is cached
     let fits = (1..=enough).rev().find(|batch| needs(batch) + archive.memory <= config.memory);
     fits.ok_or_else(|| {

@@ -9,10 +9,10 @@ use wavesplat_format::{BlockId, Metadata};
 /// The decoded blocks above that were used last, for all threads.
 #[derive(Debug)]
 pub(crate) struct AboveBlocks {
-    /// Bytes that stay decoded.
-    room: usize,
+    /// The largest number of blocks that stay decoded.
+    most: usize,
     /// The most recently used comes last.
-    kept: Mutex<Vec<Kept>>,
+    kept: Mutex<Vec<(AboveKey, Slot)>>,
 }
 
 /// What is decoded of a block.
@@ -27,36 +27,31 @@ pub(crate) struct AboveKey {
 /// Empty until one thread has decoded it; others wait.
 type Slot = Arc<Mutex<Option<Arc<Field<'static>>>>>;
 
-#[derive(Debug)]
-struct Kept {
-    key: AboveKey,
-    slot: Slot,
-    bytes: usize,
-}
-
-/// Bytes of an open file that stay decoded.
-const ROOM: usize = 64 << 20;
+/// The blocks of an open file that stay decoded for each thread.
+const FOR_A_THREAD: usize = 2;
 
 impl Default for AboveBlocks {
     fn default() -> Self {
-        Self::new(ROOM)
+        Self::new(FOR_A_THREAD * rayon::current_num_threads())
     }
 }
 
 impl AboveBlocks {
-    /// Room for so many bytes, and for the block that was used last.
-    pub(crate) fn new(room: usize) -> Self {
-        Self { room, kept: Mutex::default() }
+    /// The largest number of blocks above others that are decoded at a time, for each thread.
+    pub(crate) const HELD_BY_A_THREAD: usize = FOR_A_THREAD + 1;
+
+    /// Room for so many blocks, at least one.
+    pub(crate) fn new(most: usize) -> Self {
+        Self { most: most.max(1), kept: Mutex::default() }
     }
 
-    /// A decoded block of `bytes` bytes.
+    /// A decoded block.
     pub(crate) fn field(
         &self,
         key: AboveKey,
-        bytes: usize,
         decode: impl FnOnce() -> Result<Arc<Field<'static>>>,
     ) -> Result<Arc<Field<'static>>> {
-        let slot = self.slot(key, bytes);
+        let slot = self.slot(key);
         let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
         match &*slot {
             Some(field) => Ok(field.clone()),
@@ -64,16 +59,15 @@ impl AboveBlocks {
         }
     }
 
-    /// The place of a decoded block. Makes room for its bytes.
-    fn slot(&self, key: AboveKey, bytes: usize) -> Slot {
+    /// The place of a decoded block. The least recently used ones make room.
+    fn slot(&self, key: AboveKey) -> Slot {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = kept.iter().position(|kept| kept.key == key).map(|at| kept.remove(at));
-        let used = found.unwrap_or_else(|| Kept { key, slot: Slot::default(), bytes });
-        let slot = used.slot.clone();
+        let found = kept.iter().position(|(kept, _)| *kept == key).map(|at| kept.remove(at));
+        let used = found.unwrap_or_else(|| (key, Slot::default()));
+        let slot = used.1.clone();
         kept.push(used);
-        while kept.len() > 1 && kept.iter().map(|kept| kept.bytes).sum::<usize>() > self.room {
-            kept.remove(0);
-        }
+        let old = kept.len().saturating_sub(self.most);
+        kept.drain(..old);
         slot
     }
 }
@@ -95,13 +89,6 @@ impl PlaceAbove {
         let [own, outer] = [id, above].map(|id| file.block_box(id.tier, id.block).unwrap_or_default());
         let start = std::array::from_fn(|a| ((own.0[a] - outer.0[a]) >> (u32::from(tier) + lod)) as usize);
         Self { id: above, start, size: codec.at(tier, lod).decoded_size(outer.1.map(|n| n as usize)) }
-    }
-
-    /// Bytes of the decoded nodes of all k.
-    pub(crate) fn bytes(&self, codec: &WindowCodec) -> usize {
-        let is_single = codec.scheme.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
-        let each = if is_single { size_of::<f32>() } else { size_of::<f64>() };
-        self.size.iter().product::<usize>() * codec.basis.coefficients() * each
     }
 
     pub(crate) fn with(self, field: Arc<Field<'static>>) -> Above {

@@ -255,7 +255,8 @@ impl CoefficientFile {
     /// and exactly stored samples.
     pub fn block_bytes(&self) -> usize {
         let payload = 5;
-        self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size())
+        let own = self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size());
+        own + self.bytes_above()
     }
 
     /// The window that holds a frame; the last one for frames past the end.
@@ -414,9 +415,9 @@ impl CoefficientFile {
             skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
             return Ok(Block::missing(codec, size));
         }
-        let (above, bytes_above) = match entry.is_exact() {
-            true => (None, 0),
-            false => self.above(codec, entry.id, wanted)?,
+        let (above, bytes_above) = match entry.begins_above(codec.tiers()) {
+            true => self.above(codec, entry.id, wanted)?,
+            false => (None, 0),
         };
         let mut block = Block::read(&self.reader, codec, entry, size, wanted, above).map_err(|e| self.failed(e))?;
         block.bytes_read += bytes_above;
@@ -431,8 +432,11 @@ impl CoefficientFile {
     /// The codec for [`Self::coarse`] of every `stride`-th voxel.
     pub(crate) fn coarse_codec(&self, window: u32, stride: usize) -> Result<WindowCodec> {
         let refined = detail::refines_space(&self.metadata().windows[window as usize]);
-        let lod = if refined { coarse::level_of(stride << self.lod) } else { 0 };
-        Ok(WindowCodec { lod, ..self.codec_of_all(window)? })
+        let codec = self.codec_of_all(window)?;
+        // Blocks must begin on the lattice of those above.
+        let on_lattice = if codec.tiers() > 0 { self.metadata().block_edge.trailing_zeros() } else { u32::MAX };
+        let lod = if refined { coarse::level_of(stride << self.lod).min(on_lattice) } else { 0 };
+        Ok(WindowCodec { lod, ..codec })
     }
 
     /// Every n-th sample along each axis of a block, in some frames of its window: frame after frame, x

@@ -91,7 +91,7 @@ fn layout(
 ) -> Layout {
     let BatchRequest { frames, channel, config, .. } = *request;
     let leaves = file.leaves_of(window, channel);
-    let coded = leaves.iter().any(|leaf| leaf.coded > 0);
+    let coded = codec.tiers() > 0 || leaves.iter().any(|leaf| leaf.coded > 0);
     let exact = leaves.iter().any(|leaf| leaf.exact > 0);
     let record = &file.metadata().windows[window as usize];
     let missing = file.has_missing(window);

@@ -127,13 +127,13 @@ fn coefficients<'a>(
 /// The values of each frame of a plan: computed from the coefficients, plus the corrections in `few`, which are removed
 /// from there.
 fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut [Vec<(u32, f64)>]) -> Vec<f64> {
-    if block.codes.is_empty() && few.is_empty() {
+    if block.is_zero() && few.is_empty() {
         return Vec::new();
     }
     let mut values = vec![0.0; plan.frames.len() * block.voxels];
     if plan.few {
         add_coefficients(plan, block, field, &mut values);
-    } else if !block.codes.is_empty() {
+    } else if !block.is_zero() {
         put_runs(plan, block, &mut values);
     }
     for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {

@@ -135,11 +135,13 @@ impl<'a> CoefficientBatch<'a> {
     fn open(file: &'a CoefficientFile, what: SplatSource, request: &BatchRequest<'a>) -> Result<Self> {
         let window = file.window_of(request.frames[0]);
         let plan = BatchPlan::new(file, what, window, request)?;
+        let above =
+            if request.config.certify { file.largest_above(&plan.codec, window, request.channel)? } else { 0.0 };
         let mut batch = Self {
             file,
             window,
             channel: request.channel,
-            selector: BlockSelector::new(&plan.codec, request.config, &file.grid),
+            selector: BlockSelector::new(&plan.codec, above, request.config, &file.grid),
             plan,
             views: request.views,
             selection: Selection::default(),
@@ -195,7 +197,7 @@ impl<'a> CoefficientBatch<'a> {
         found.left_out += kept.left_out;
         found.other_frames += self.of_other_frames(&kept.entry);
         found.certified = found.certified.max(kept.certified);
-        found.empty -= u64::from(!entry.parts.is_empty() || entry.lost);
+        found.empty -= u64::from(!self.is_nothing(entry) || entry.lost);
         if !self.adds_nothing(kept) {
             found.blocks.push(entry.id.block as usize);
         }
@@ -261,9 +263,14 @@ impl<'a> CoefficientBatch<'a> {
         left_out(entry, &BlockEntry { parts, ..entry.clone() })
     }
 
+    /// Whether all samples of a block are zero and none is missing.
+    fn is_nothing(&self, entry: &BlockEntry) -> bool {
+        entry.parts.is_empty() && !entry.begins_above(self.plan.codec.tiers())
+    }
+
     /// Whether a block adds nothing to any plane.
     fn adds_nothing(&self, kept: &KeptParts) -> bool {
-        kept.entry.parts.is_empty()
+        self.is_nothing(&kept.entry)
             && !kept.entry.lost
             && (self.plan.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
     }

@@ -43,6 +43,9 @@ pub(super) struct BlockSelector {
     alike: Vec<f64>,
     /// Whether the directory's statistics of a part include all finer parts.
     cumulative: bool,
+    /// The tiers above tier 0, and an upper bound of the coefficients that blocks begin with.
+    tiers: u8,
+    above: f64,
     frames: usize,
     pub(super) rule: Rule,
 }
@@ -129,14 +132,15 @@ impl<'a> RateAllocator<'a> {
 }
 
 impl BlockSelector {
-    /// A selector that leaves out nothing yet.
-    pub(super) fn new(codec: &WindowCodec, config: &RenderConfig, grid: &Grid) -> Self {
+    /// A selector that leaves out nothing yet. Blocks begin with coefficients of at most `above`.
+    pub(super) fn new(codec: &WindowCodec, above: f64, config: &RenderConfig, grid: &Grid) -> Self {
         let gains = codec.part_gains();
         let largest_gain = gains.iter().map(|g| g.iter().copied().fold(0.0, f64::max)).collect();
         let cumulative = codec.scheme.pyramid.is_some();
         let alike = codec.sides_alike().into_iter().map(|side| alike(config, grid, side)).collect();
         let (energy_gain, frames) = (codec.energy_gains(), codec.frames());
-        Self { gains, largest_gain, energy_gain, alike, cumulative, frames, rule: Rule::Nothing }
+        let (tiers, rule) = (codec.tiers(), Rule::Nothing);
+        Self { gains, largest_gain, energy_gain, alike, cumulative, tiers, above, frames, rule }
     }
 
     /// The parts of a block to read: all but those that the rule leaves out. If zeros are within the limit, only the
@@ -180,6 +184,7 @@ impl BlockSelector {
             kept.expected + all.change
         };
         kept.entry.parts.retain(|p| p.kind == PartKind::Missing);
+        kept.entry.stats.step = 0.0; // so that it does not begin with the nodes above
     }
 
     fn leave_out_within(&self, allowed: f64, block: &BlockView<'_>, kept: &mut KeptParts) {
@@ -258,7 +263,8 @@ impl BlockSelector {
     pub(super) fn absolute_sum(&self, entry: &BlockEntry) -> f64 {
         let levels = levels(entry).into_iter();
         let each = levels.map(|part| part.entry.stats.largest * self.largest_gain[part.level]);
-        if self.cumulative { each.fold(0.0, f64::max) } else { each.sum() }
+        let of_above = if entry.begins_above(self.tiers) { self.above * self.largest_gain[0] } else { 0.0 };
+        of_above + if self.cumulative { each.fold(0.0, f64::max) } else { each.sum() }
     }
 }
 
