@@ -85,7 +85,7 @@ impl Header {
             1..TIERED => FEATURES_VERSION,
             TIERED.. => TIERED_VERSION,
         };
-        let needs = (0..REQUIRED.len()).rfind(|bit| required >> bit & 1 == 1).map_or("", |bit| REQUIRED[bit]);
+        let needs = (0..REQUIRED.len()).find(|bit| required >> bit & 1 == 1).map_or("", |bit| REQUIRED[bit]);
         Self { version, required, optional: 0, id, needs: needs.into() }
     }
 

@@ -221,7 +221,8 @@ fn check_block(
     entry: &BlockEntry,
     source: Option<&dyn FrameWindow>,
 ) -> Result<Comparison> {
-    let codec = &codec.at(entry.id.tier, 0);
+    let coarse = (entry.id.tier > 0).then(|| codec.at(entry.id.tier, 0));
+    let codec = coarse.as_ref().unwrap_or(codec);
     let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
     check_coefficients(file, entry, &block, codec)?;
     let Some(source) = source.filter(|_| entry.id.tier == 0) else { return Ok(Comparison::default()) };
