@@ -236,7 +236,7 @@ impl Metadata {
         ensure(spaced && self.origin.iter().all(|o| o.is_finite()), || "spacing or origin out of range".into())?;
         ensure((1..=MAX_CHANNELS).contains(&self.channels), || format!("{} channels", self.channels))?;
         ensure(self.block_edge > 0, || "a block edge of 0".into())?;
-        let blocks = self.count_blocks().and_then(|n| u32::try_from(n).ok());
+        let blocks = self.count_blocks(0).and_then(|n| u32::try_from(n).ok());
         ensure(blocks.is_some(), || "too many blocks in a window".into())
     }
 
@@ -284,14 +284,13 @@ impl Metadata {
         u64::from(self.block_edge) << tier.min(MAX_TIERS)
     }
 
-    fn count_blocks(&self) -> Option<u64> {
-        self.blocks_per_axis(0).iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks))
+    fn count_blocks(&self, tier: u8) -> Option<u64> {
+        self.blocks_per_axis(tier).iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks))
     }
 
     /// Number of blocks of a tier in one window and channel; meaningful for valid metadata.
     pub fn blocks_per_channel(&self, tier: u8) -> u32 {
-        let count = self.blocks_per_axis(tier).iter().try_fold(1, |count: u64, &blocks| count.checked_mul(blocks));
-        count.and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX)
+        self.count_blocks(tier).and_then(|n| u32::try_from(n).ok()).unwrap_or(u32::MAX)
     }
 
     /// Number of tiers above the blocks of a window.

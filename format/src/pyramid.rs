@@ -181,9 +181,7 @@ impl Pass {
     pub fn codes(&self) -> usize {
         self.extent().iter().product()
     }
-}
 
-impl Pass {
     /// The pass on the lattice at multiples of `2^level` along x, y and z.
     fn thinned(&self, level: u32) -> Self {
         let (strides, limits) = (self.strides, self.limits);

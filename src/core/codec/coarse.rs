@@ -20,7 +20,8 @@ pub fn level_of(stride: usize) -> u32 {
 
 /// Every `stride`-th voxel along each axis of a block of `size` voxels, in some frames of the window: frame after frame, x
 /// fastest; NaN where a sample is missing, or where the block is lost. The codec must have the level of detail of
-/// [`level_of`], or a finer one. `read` reads the coefficients of the block that it is told to.
+/// [`level_of`], or a finer one. `read` reads the block with the
+/// coefficients that its argument marks.
 pub fn thinned<E>(
     codec: &WindowCodec,
     entry: &BlockEntry,

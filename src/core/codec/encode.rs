@@ -109,21 +109,20 @@ impl Encoder {
         let samples = of.coarse(codec, samples);
         let missing = Missing::find(codec, &samples);
         let source = Source { codec, size: of.size, samples: &samples, missing: &missing };
-        let ks = codec.basis.coefficients();
-        let (coded, field) = match &codec.scheme.pyramid {
-            Some(pyramid) if pyramid.single => {
+        let Some(pyramid) = &codec.scheme.pyramid else { return Ok(self.uncoded(codec, id, size, above)) };
+        let coded = match pyramid.single {
+            true => {
                 let known = above.map(Above::singles);
-                let coded = source.refine(pyramid, size, &source, known, &mut self.single, &mut self.codes);
-                (coded, Field::coarse(Some(&self.single[1]), &[], ks))
+                source.refine(pyramid, size, &source, known, &mut self.single, &mut self.codes)
             }
-            Some(pyramid) => {
+            false => {
                 let known = above.map(Above::doubles);
-                let coded = source.refine(pyramid, size, &source, known, &mut self.double, &mut self.codes);
-                (coded, Field::coarse(None, &self.double[1], ks))
+                source.refine(pyramid, size, &source, known, &mut self.double, &mut self.codes)
             }
-            None => (None, Field::coarse(None, &[], ks)),
         };
         let Some(coded) = coded else { return Ok(self.uncoded(codec, id, size, above)) };
+        let single = pyramid.single.then_some(&self.single[1][..]);
+        let field = Field::coarse(single, &self.double[1], codec.basis.coefficients());
         let Parts { stats, parts, .. } = self.coded_parts(codec, size, &coded)?;
         Ok((EncodedBlock { id, stats, parts }, field))
     }

@@ -3,7 +3,7 @@
 use super::WindowCodec;
 use super::buffer::Buffer;
 use super::codes::Codes;
-use super::pyramid::{Known, Nodes, PredictionPasses};
+use super::pyramid::{Known, Nodes, PARTS, PredictionPasses};
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::base::vectors::dispatch;
@@ -223,9 +223,9 @@ impl<'a> Field<'a> {
         above: Option<&Above>,
     ) -> Vec<Change> {
         match &self.values {
-            Values::Single(field) => passes.changes(step, codes, above.map(Above::singles), field),
-            Values::Double(field) => passes.changes(step, codes, above.map(Above::doubles), field),
-            Values::Zero | Values::Codes { .. } => vec![Change::default(); usize::from(Pyramid::PARTS)],
+            Values::Single(field) => passes.changes(&[true; PARTS], step, codes, above.map(Above::singles), field),
+            Values::Double(field) => passes.changes(&[true; PARTS], step, codes, above.map(Above::doubles), field),
+            Values::Zero | Values::Codes { .. } => vec![Change::default(); PARTS],
         }
     }
 
@@ -380,13 +380,11 @@ impl Refined<'_> {
             return (Values::Zero, vec![false; ks]);
         }
         let mut field = Buffer::with_len(nodes.iter().product::<usize>() * ks);
-        match known.filter(|_| codec.is_all_above()) {
-            Some(known) => known.copy(nodes, 0..ks, &mut field),
-            None => {
-                let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
-                return (values(field), marked);
-            }
+        if let Some(known) = known.filter(|_| codec.is_all_above()) {
+            known.copy(nodes, 0..ks, &mut field);
+            return (values(field), vec![true; ks]);
         }
-        (values(field), vec![true; ks])
+        let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
+        (values(field), marked)
     }
 }

@@ -81,10 +81,10 @@ impl Source<'_> {
         [source, field, split]: &mut [Vec<R>; 3],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
-        let passes = self.codec.passes(pyramid, size);
-        clear(codes).resize(passes.codes(), 0);
-        field.resize(passes.nodes().iter().product(), R::default());
         let weighing = QuantizerSetup::new(self.codec, self.samples, self.missing.magnitude)?;
+        let passes = self.codec.passes(pyramid, size);
+        codes.resize(passes.codes(), 0);
+        field.resize(passes.nodes().iter().product(), R::default());
         if let Some(zero) = self.zero(&weighing, &passes, field) {
             return Some(zero);
         }
@@ -110,7 +110,8 @@ impl Source<'_> {
         let Checked { listed, tally } = checked;
         let mut tally = if self.codec.tier > 0 { Tally::new() } else { tally? };
         let outliers = tally.take_outliers(self.codec, self.samples);
-        let changes = passes.changes_of_coded(step, &listed, known, field);
+        // The directory lists no other parts.
+        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field);
         let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })

@@ -14,18 +14,18 @@ impl<'a> PredictionPasses<'a> {
         if lod == 0 {
             return whole;
         }
-        let lod_of_levels = lod + u32::from(tier);
+        let finest_level = lod + u32::from(tier);
         let every = |pass: &Pass, a: usize| if a < 3 { pass.strides[a].max(1 << lod) } else { pass.strides[a] };
         let step = |pass: &Pass| {
             let lattice: [usize; 4] = std::array::from_fn(|a| pass.limits[a].div_ceil(every(pass, a)));
             let [_, _, _, added] = pass.extent();
             match pass.axis {
                 Some(Axis::T) => Step { axis: pass.axis, lattice, added: [lattice[0], lattice[1], lattice[2], added] },
-                _ if has_nodes(pass, lod_of_levels) => Step { lattice, ..Step::from(pass) },
+                _ if has_nodes(pass, finest_level) => Step { lattice, ..Step::from(pass) },
                 axis => Step { axis, lattice, added: [0; 4] },
             }
         };
-        let kept: Vec<&Pass> = whole.passes.iter().filter(|pass| is_kept(pass, lod_of_levels)).collect();
+        let kept: Vec<&Pass> = whole.passes.iter().filter(|pass| is_kept(pass, finest_level)).collect();
         let steps: Vec<Step> = kept.iter().map(|pass| step(pass)).collect();
         let coarse = |pass: &&Pass| Pass {
             strides: std::array::from_fn(|a| every(pass, a) >> if a < 3 { lod } else { 0 }),
@@ -37,19 +37,19 @@ impl<'a> PredictionPasses<'a> {
         let shape = [x, y, z, whole.shape[3]];
         let mut new = Self { pyramid, shape, pyramids: whole.pyramids, passes, steps, boxes: Vec::new(), stages };
         new.boxes =
-            whole.boxes.iter().filter_map(|of| of.of).map(|of| new.thinned(&whole, &of, lod, lod_of_levels)).collect();
+            whole.boxes.iter().filter_map(|of| of.of).map(|of| new.thinned(&whole, &of, lod, finest_level)).collect();
         new
     }
 
     /// The part of a code box of the whole block that this level of detail reads.
-    fn thinned(&self, whole: &Self, of: &PassBox, lod: u32, lod_of_levels: u32) -> PlacedBox {
+    fn thinned(&self, whole: &Self, of: &PassBox, lod: u32, finest_level: u32) -> PlacedBox {
         let (pass, part) = (whole.passes[of.pass], of.part);
         let mut at = CodeBox { allowed: of.allowed, ..CodeBox::contiguous(of.extents(whole.extent(of.pass))) };
         let left_out = PlacedBox { of: None, part, at, every: [1; 3] };
-        if !has_nodes(&pass, lod_of_levels) {
+        if !has_nodes(&pass, finest_level) {
             return left_out;
         }
-        let number = whole.passes[..of.pass].iter().filter(|pass| is_kept(pass, lod_of_levels)).count();
+        let number = whole.passes[..of.pass].iter().filter(|pass| is_kept(pass, finest_level)).count();
         let apart: [usize; 3] = std::array::from_fn(|a| of.every[a] * pass.strides[a]);
         let every = apart.map(|apart| (1_usize << lod).div_ceil(apart));
         if every == [1; 3] {

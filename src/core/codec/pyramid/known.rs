@@ -78,8 +78,8 @@ impl<'a, R: Real> KnownNodes<'a, R> {
         Self { known, first, passes: passes.iter().map(Place::new).collect() }
     }
 
-    /// Gives the known nodes in the `slice`-th of the slices that a pass adds their values, and calls `found` with each row of them:
-    /// its first place, the distance of nodes, and their number.
+    /// Puts the known nodes back into a slice that a pass has predicted. Calls `found` with the first place of each row of known
+    /// nodes, their distance and their number.
     pub(super) fn restore(
         &self,
         pass: usize,

@@ -45,7 +45,7 @@ use super::real::Real;
 use super::rows::{self, Change, add_changes, add_changes_to_zero};
 use crate::base::vectors::dispatch;
 use crate::wavelet;
-use corrections::{Correction, Decoding, Encoding};
+use corrections::{Decoding, Encoding};
 use known::KnownNodes;
 pub(crate) use known::{Known, Nodes};
 use refine::gather;
@@ -55,7 +55,7 @@ use wavesplat_format::{Axis, BlockEntry, CodeBox, DenseCodes, EncodedBlock, Part
 use wavesplat_format::{SparseCodes, Storage};
 
 /// The number of level parts of a block.
-const PARTS: usize = Pyramid::PARTS as usize;
+pub(crate) const PARTS: usize = Pyramid::PARTS as usize;
 
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
 #[derive(Debug)]
@@ -278,8 +278,7 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed;
-    /// `split` is scratch. NaN nodes get the code 0. False if a code does not
-    /// fit. `codes` are in order, pass after pass.
+    /// `split` is scratch. NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass.
     pub(crate) fn encode<R: Real>(
         &self,
         step: f64,
@@ -321,46 +320,30 @@ impl<'a> PredictionPasses<'a> {
         }
     }
 
-    /// The change of a decoded field from leaving out each level part and all finer ones.
+    /// The level parts with a code that is not zero.
+    pub(crate) fn coded(&self, codes: &SparseCodes) -> [bool; PARTS] {
+        std::array::from_fn(|part| self.count(part as u8, codes) > 0)
+    }
+
+    /// The changes of a decoded field from leaving out each part that `parts` marks and all finer ones.
     pub(crate) fn changes<R: Real>(
         &self,
+        parts: &[bool; PARTS],
         step: f64,
         codes: &SparseCodes,
         known: Option<Known<'_, R>>,
         field: &[R],
-    ) -> Vec<Change> {
-        self.changes_without(&[true; PARTS], field, |number, parts| self.sparse(number, step, codes, known, parts))
-    }
-
-    /// As [`Self::changes`], only for parts with a code that is not zero: the directory does not list others.
-    pub(crate) fn changes_of_coded<R: Real>(
-        &self,
-        step: f64,
-        codes: &SparseCodes,
-        known: Option<Known<'_, R>>,
-        field: &[R],
-    ) -> Vec<Change> {
-        let coded = std::array::from_fn(|part| self.count(part as u8, codes) > 0);
-        self.changes_without(&coded, field, |number, parts| self.sparse(number, step, codes, known, parts))
-    }
-
-    /// The changes from leaving out each part that `wanted` marks and all finer ones. `decoding(number, parts)` decodes a
-    /// pyramid from its first parts alone.
-    fn changes_without<R: Real, C: Correction<R>>(
-        &self,
-        wanted: &[bool; PARTS],
-        field: &[R],
-        decoding: impl Fn(usize, usize) -> C,
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
         let mut rest = Buffer::with_len(self.pyramid_nodes());
         let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
         for (number, nodes) in pyramids.filter(|(_, nodes)| !rows::is_zero(nodes)) {
-            for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| wanted[*part]) {
+            for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| parts[*part]) {
                 if part == 0 && !self.has_known() {
                     dispatch!(add_changes_to_zero(change, nodes));
                 } else {
-                    self.stages.refine(&vec![true; self.shape[3]], &mut rest, &mut decoding(number, part));
+                    let mut decoding = self.sparse(number, step, codes, known, part);
+                    self.stages.refine(&vec![true; self.shape[3]], &mut rest, &mut decoding);
                     dispatch!(add_changes(change, nodes, &rest[..]));
                 }
             }

@@ -181,8 +181,9 @@ fn encoded_nodes_are_those_of_the_format() {
         });
         assert_eq!(bits(&field), bits(&decoded), "{pyramid:?} {shape:?}");
         assert_eq!(codes, expected);
-        let coded = passes.changes_of_coded(0.7, &passes.list(&codes), None, &field);
-        let changes = passes.changes(0.7, &passes.list(&codes), None, &field);
+        let listed = passes.list(&codes);
+        let coded = passes.changes(&passes.coded(&listed), 0.7, &listed, None, &field);
+        let changes = passes.changes(&[true; PARTS], 0.7, &listed, None, &field);
         for part in 0..PARTS {
             let rest = twin_decoded(&pyramid, shape, 0.7, &codes, part);
             let largest = rest.iter().zip(&field).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
@@ -218,6 +219,28 @@ fn codes_that_do_not_fit_are_noticed() {
     }
 }
 
+/// The codes that a level of detail reads of all codes of a block: those of the parts that it needs.
+pub(super) fn coarse_codes(
+    whole: &PredictionPasses<'_>,
+    passes: &PredictionPasses<'_>,
+    codes: &[i32],
+    lod: u32,
+) -> SparseCodes {
+    let (packing, needed) = (whole.pyramid.packing, crate::codec::coarsest_part(whole.pyramid, lod));
+    let mut read = SparseCodes::default();
+    for part in 0..Pyramid::PARTS {
+        let mut raw = Vec::new();
+        packing.pack(&whole.part_of(part, codes), &mut raw);
+        if usize::from(part) <= needed {
+            packing.unpack(&raw, &passes.placed_boxes(part), &mut read).expect("packed");
+        } else {
+            read.skip(&passes.placed_boxes(part));
+        }
+    }
+    passes.thin(&mut read);
+    read
+}
+
 /// Every 2^lod-th node, from the parts that hold them, is what all codes give.
 #[test]
 fn coarse_lattices_have_the_nodes_of_all_passes() {
@@ -233,18 +256,7 @@ fn coarse_lattices_have_the_nodes_of_all_passes() {
         let whole = passes_of(&pyramid, shape);
         for lod in 1..4 {
             let passes = PredictionPasses::with_detail(&pyramid, [shape[0], shape[1], shape[2]], shape[3], 0, lod);
-            let mut read = SparseCodes::default();
-            let needed = crate::codec::coarsest_part(&pyramid, lod);
-            for part in 0..Pyramid::PARTS {
-                let mut raw = Vec::new();
-                pyramid.packing.pack(&whole.part_of(part, &codes), &mut raw);
-                if usize::from(part) <= needed {
-                    pyramid.packing.unpack(&raw, &passes.placed_boxes(part), &mut read).expect("packed");
-                } else {
-                    read.skip(&passes.placed_boxes(part));
-                }
-            }
-            passes.thin(&mut read);
+            let read = coarse_codes(&whole, &passes, &codes, lod);
             let [x, y, z, k] = passes.nodes();
             let mut coarse = vec![f64::NAN; x * y * z * k];
             passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse);

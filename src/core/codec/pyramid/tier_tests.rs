@@ -1,6 +1,6 @@
 //! Compares blocks of tiers with a slow twin that follows `FORMAT.md`, section 8, node by node, in the positions of voxels.
 
-use super::tests::{below, bits, some_codes};
+use super::tests::{below, bits, coarse_codes, some_codes};
 use super::*;
 use std::collections::HashMap;
 use wavesplat_format::{Packing, Stencil};
@@ -221,18 +221,7 @@ fn coarse_lattices_of_the_last_tier_have_the_nodes_of_all_passes() {
         whole.decode_some(&vec![true; ks], 0.3, &listed, None, &mut field);
         for lod in 1..4 {
             let passes = PredictionPasses::with_detail(&case.pyramid, case.size, ks, case.tier, lod);
-            let (mut read, mut raw) = (SparseCodes::default(), Vec::new());
-            let needed = crate::codec::coarsest_part(&case.pyramid, lod);
-            for part in 0..Pyramid::PARTS {
-                raw.clear();
-                Packing::Nested.pack(&whole.part_of(part, &codes), &mut raw);
-                if usize::from(part) <= needed {
-                    Packing::Nested.unpack(&raw, &passes.placed_boxes(part), &mut read).expect("packed");
-                } else {
-                    read.skip(&passes.placed_boxes(part));
-                }
-            }
-            passes.thin(&mut read);
+            let read = coarse_codes(&whole, &passes, &codes, lod);
             let [x, y, z, k] = passes.nodes();
             let mut coarse = vec![f64::NAN; x * y * z * k];
             passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse);
