@@ -93,12 +93,12 @@ const DIGESTS: [u64; 13] = [
     0x6f89_f10e_f88d_5963,
     0xf853_f6f1_eee8_03a4,
     0x4b79_6b0c_ce4a_73ce,
-    0x3311_c8c2_79a8_2898,
-    0x3a6d_17b8_41d0_c072,
-    0xd9c2_8b2a_905c_7fae,
-    0xe752_248b_885d_10e6,
-    0xbf81_1941_1aff_e382,
-    0x2daa_0501_850a_96d8,
+    0xd24b_ca35_83e3_f948,
+    0x41a3_eda1_42a1_b847,
+    0x4463_9dc6_be5d_958e,
+    0x95ea_b186_23ea_b30b,
+    0x357c_6bdb_f2ad_9946,
+    0x65fe_e095_0e8d_6829,
 ];
 
 #[test]

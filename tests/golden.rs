@@ -88,6 +88,16 @@ fn features() -> Vec<(String, SampleType, Kind, Mask, ConvertConfig)> {
     add("nested-learned", Kind::Wave, Mask::None, plain(Basis::Learned));
     add("nested-missing", Kind::Mixed, Mask::Special, pyramid(Basis::Samples, Stencil::Cubic, 1e-3));
     add("nested-double", Kind::Wave, Mask::None, pyramid(Basis::Haar, Stencil::Linear, 1e-7));
+    // Version 1.2: tiers.
+    let mut add_tiered = |name: &str, block, kind, mask, config| {
+        add(&format!("tiered-{name}"), kind, mask, ConvertConfig { block: Some(block), ..config });
+    };
+    let over_time = pyramid(Basis::Samples, Stencil::Cubic, 1e-3);
+    add_tiered("samples", 2, Kind::Wave, Mask::None, plain(Basis::Samples));
+    add_tiered("learned", 2, Kind::Wave, Mask::None, plain(Basis::Learned));
+    add_tiered("missing", 4, Kind::Mixed, Mask::Special, over_time.clone());
+    add_tiered("zeros", 2, Kind::Flash, Mask::None, over_time);
+    add_tiered("double", 4, Kind::Wave, Mask::None, pyramid(Basis::Haar, Stencil::Linear, 1e-7));
     found
 }
 
@@ -134,7 +144,7 @@ fn totals(file: &CoefficientFile) -> Vec<(u64, [f64; 6], [u64; 4])> {
 #[test]
 fn golden_files_are_continued_under_their_own_id() {
     for (seed, (name, ty, kind, mask, config)) in features().into_iter().enumerate() {
-        let config = ConvertConfig { block: Some(6), ..config };
+        let config = ConvertConfig { block: config.block.or(Some(6)), ..config };
         let golden = fs::read(folder().join(format!("{name}.wspl"))).unwrap();
         let unfinished = CompletePrefix::read(&&golden[..golden.len() * 2 / 3]).unwrap();
         let (id, windows) = (unfinished.id(), unfinished.metadata().windows.clone());
@@ -169,7 +179,7 @@ fn a_file_id_follows_from_the_encoded_start_and_the_first_digest() {
 #[ignore = "writes golden files of new features"]
 fn golden_files_are_made() {
     for (seed, (name, ty, kind, mask, config)) in features().into_iter().enumerate() {
-        let config = ConvertConfig { block: Some(6), ..config };
+        let config = ConvertConfig { block: config.block.or(Some(6)), ..config };
         keep(&name, &stored(&mut source(seed, (ty, kind, mask)), &config).bytes());
     }
     let mut damaged = fs::read(folder().join("haar-u8.wspl")).unwrap();
@@ -211,10 +221,10 @@ fn features_of_later_versions_are_refused_by_name() {
     file[10] = 7; // the minor version
     file[24] = 0xFF; // optional features
     assert_eq!(refused(&mut file), None);
-    file[16] = 0b100; // a required feature
+    file[16] = 0b1000; // a required feature
     file[48..48 + 20].copy_from_slice(b"bases by wavesplat 3");
     let (code, message) = refused(&mut file).unwrap();
-    assert!(code == 3 && message.contains("required feature bit 2 (bases by wavesplat 3)"), "{message}");
+    assert!(code == 3 && message.contains("required feature bit 3 (bases by wavesplat 3)"), "{message}");
     file[16] = 0;
     file[8] = 2;
     let (code, message) = refused(&mut file).unwrap();

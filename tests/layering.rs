@@ -45,10 +45,8 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
         &[
             "core/base/workers.rs",
             "core/source/scan.rs",
-            "engine/file/fetch.rs",
-            "engine/file/above.rs",
             "engine/file/check.rs",
-            "engine/file/coefficient_file.rs",
+            "engine/file/skip.rs",
             "engine/file/repack.rs",
             "engine/file/verify.rs",
             "engine/convert/mod.rs",

@@ -1,7 +1,8 @@
 //! Blocks and their parts before they are written, and the compressor that makes a part.
 
-use crate::limits::MAX_PART_RAW;
-use crate::section::decompress;
+use crate::directory::{BLOCK_ENTRY, PART_ENTRY, begins_above};
+use crate::limits::{MAX_PART_RAW, align};
+use crate::section::{FRAME, decompress};
 use crate::{Error, Result};
 use std::cmp::{Ordering, Reverse};
 use std::fmt;
@@ -166,6 +167,24 @@ pub struct EncodedBlock {
     pub stats: BlockStats,
     /// Its parts in order.
     pub parts: Vec<EncodedPart>,
+}
+
+impl EncodedBlock {
+    /// As [`BlockEntry::begins_above`](crate::BlockEntry::begins_above).
+    pub fn begins_above(&self, tiers: u8) -> bool {
+        begins_above(self.id, self.stats, self.parts.iter().any(|part| part.kind == PartKind::Exact), tiers)
+    }
+
+    /// Bytes of the block in a file, up to what follows it.
+    pub fn stored_len(&self) -> u64 {
+        let parts: usize = self.parts.iter().map(|part| part.stored.len()).sum();
+        align(FRAME as u64 + self.entry_len() + parts as u64)
+    }
+
+    /// Bytes of its entry: once in the block, and once more in a leaf of the directory before that is compressed.
+    pub fn entry_len(&self) -> u64 {
+        (BLOCK_ENTRY + PART_ENTRY * self.parts.len()) as u64
+    }
 }
 
 /// Compresses parts. Each worker reuses one compressor. The compressed bytes depend only on the input and the level.

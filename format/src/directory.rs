@@ -64,7 +64,7 @@ impl BlockEntry {
     /// Whether it begins with the nodes of the block above, in a window with so many tiers. Without a step, all samples of a
     /// block of tier 0 are zero.
     pub fn begins_above(&self, tiers: u8) -> bool {
-        self.id.tier < tiers && !self.is_exact() && (self.id.tier > 0 || self.stats.step > 0.0)
+        begins_above(self.id, self.stats, self.is_exact(), tiers)
     }
 
     /// Bytes of its parts in the file, without header and padding.
@@ -115,8 +115,8 @@ impl BlockEntry {
         Ok(Self { id, stats, parts, lost: lost == 1 })
     }
 
-    /// Checks that do not depend on the metadata.
-    pub(crate) fn check(&self) -> ParseResult {
+    /// Checks of a block in a window with so many tiers that do not depend on the rest of the metadata.
+    pub(crate) fn check(&self, tiers: u8) -> ParseResult {
         let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
         ensure(finite_amount(step) && finite_amount(reached), || "a step or an error out of range".into())?;
         ensure(is_amount(squared_error) && is_amount(dropped), || "an energy out of range".into())?;
@@ -129,11 +129,12 @@ impl BlockEntry {
         ensure(!both, || "both exact samples and coefficients or outliers".into())?;
         let lost = !self.lost || self.encoded() == Self::lost(self.id).encoded();
         ensure(lost, || "a lost block with parts or statistics".into())?;
+        self.check_tier(tiers)?;
         self.parts.iter().try_for_each(PartEntry::check)
     }
 
     /// Checks what only blocks of a window with tiers must satisfy.
-    pub(crate) fn check_tier(&self, tiers: u8) -> ParseResult {
+    fn check_tier(&self, tiers: u8) -> ParseResult {
         let nothing = BlockStats { step: self.stats.step, ..Self::lost(self.id).stats };
         ensure(self.id.tier == 0 || self.stats == nothing, || "errors or a value range without samples".into())?;
         let is_coded = self.parts.iter().any(|part| matches!(part.kind, PartKind::Level(_)));
@@ -150,6 +151,11 @@ impl BlockEntry {
         }
         Ok(align(at))
     }
+}
+
+/// As [`BlockEntry::begins_above`].
+pub(crate) fn begins_above(id: BlockId, stats: BlockStats, is_exact: bool, tiers: u8) -> bool {
+    id.tier < tiers && !is_exact && (id.tier > 0 || stats.step > 0.0)
 }
 
 impl PartEntry {

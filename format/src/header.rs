@@ -22,9 +22,10 @@ const FEATURES_VERSION: (u16, u16) = (1, 1);
 const TIERED_VERSION: (u16, u16) = (1, 2);
 
 /// The required features that this reader supports, by bit, as messages for readers that do not.
-const REQUIRED: [&str; 2] = [
+const REQUIRED: [&str; 3] = [
     "nested parts (version 1.1 of the format): wavesplat 0.2 or later",
     "a description (version 1.1 of the format): wavesplat 0.2 or later",
+    "tiers (version 1.2 of the format): wavesplat 0.2 or later",
 ];
 
 /// The bit of [`Packing::Nested`].
@@ -33,7 +34,7 @@ const NESTED: u64 = 1;
 /// The bit of a description.
 const DESCRIBED: u64 = 2;
 
-/// The bit of tiers. Programs do not read files with tiers yet, so it is not among [`REQUIRED`].
+/// The bit of tiers.
 const TIERED: u64 = 4;
 
 /// The required features of a file.
@@ -48,6 +49,15 @@ pub struct Features {
 }
 
 impl Features {
+    /// The version of files with them: major and minor.
+    pub fn version(self) -> (u16, u16) {
+        match self.bits() {
+            0 => VERSION,
+            1..TIERED => FEATURES_VERSION,
+            TIERED.. => TIERED_VERSION,
+        }
+    }
+
     /// The field `required` of the header.
     pub(crate) fn bits(self) -> u64 {
         let nested = if self.packing == Packing::Nested { NESTED } else { 0 };
@@ -79,13 +89,9 @@ const NEEDS: usize = 72;
 impl Header {
     /// The header of a new file with these features.
     pub(crate) fn new(id: FileId, features: Features) -> Self {
-        let required = features.bits();
-        let version = match required {
-            0 => VERSION,
-            1..TIERED => FEATURES_VERSION,
-            TIERED.. => TIERED_VERSION,
-        };
-        let needs = (0..REQUIRED.len()).find(|bit| required >> bit & 1 == 1).map_or("", |bit| REQUIRED[bit]);
+        let (required, version) = (features.bits(), features.version());
+        let first = if required < TIERED { required.trailing_zeros() } else { TIERED.trailing_zeros() };
+        let needs = REQUIRED.get(first as usize).copied().unwrap_or_default();
         Self { version, required, optional: 0, id, needs: needs.into() }
     }
 

@@ -32,6 +32,7 @@ pub struct CompletePrefix {
 /// What reading a window adds to the prefix.
 #[derive(Default)]
 struct WindowScan {
+    tiers: u8,
     at: u64,
     leaves: Vec<LeafEntry>,
     stored: u64,
@@ -89,7 +90,8 @@ impl CompletePrefix {
         let record = WindowRecord::parse(&record)
             .and_then(|record| record.window.check_announced(self.features).map(|()| record))
             .map_err(corrupt)?;
-        for (first, count) in leaves_of(&self.metadata, number, record.window.tiers()) {
+        scan.tiers = record.window.tiers();
+        for (first, count) in leaves_of(&self.metadata, number, scan.tiers) {
             scan.read_leaf(storage, self.id, first, count)?;
         }
         let (section, at) = (SectionId::WindowEnd(number), scan.pad(storage)?);
@@ -143,7 +145,7 @@ impl WindowScan {
 
     /// Reads the next block.
     fn read_block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
-        let (entry, end) = block_at(storage, id, block, self.pad(storage)?)?;
+        let (entry, end) = block_at(storage, id, block, self.tiers, self.pad(storage)?)?;
         for part in &entry.parts {
             part.read(storage, id, block)?;
             self.stored += u64::from(part.stored_len);
@@ -166,15 +168,21 @@ fn plain_at(
     same.map_err(|what| section.corrupt(offset, what)).map(|()| (extent, content))
 }
 
-/// Reads the entry in a block's own header at `offset`; returns it and the end of the block's parts. Does not read the parts.
-pub(crate) fn block_at(storage: &impl Storage, file: FileId, id: BlockId, offset: u64) -> Result<(BlockEntry, u64)> {
+/// Reads the entry in the own header, at `offset`, of a block in a window with so many tiers; returns it and the end of the block's parts. Does not read the parts.
+pub(crate) fn block_at(
+    storage: &impl Storage,
+    file: FileId,
+    id: BlockId,
+    tiers: u8,
+    offset: u64,
+) -> Result<(BlockEntry, u64)> {
     let section = SectionId::Block(id);
     let (_, bytes) = plain_at(storage, file, section, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
     let mut fields = FieldReader::new(&bytes);
     let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
         fields.end()?;
         ensure(entry.id == id, || format!("says that it is {}", entry.id))?;
-        entry.check()?;
+        entry.check(tiers)?;
         entry.check_place(offset)?;
         Ok(entry)
     });

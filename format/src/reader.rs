@@ -144,8 +144,7 @@ impl<S: Storage> Reader<S> {
 
     fn check_entry(&self, entry: &BlockEntry) -> ParseResult {
         let geometry = self.index.metadata.geometry(entry.id).ok_or("no such block")?;
-        entry.check()?;
-        entry.check_tier(geometry.window.tiers())?;
+        entry.check(geometry.window.tiers())?;
         entry.parts.iter().try_for_each(|part| geometry.check(part))
     }
 

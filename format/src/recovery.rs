@@ -153,10 +153,12 @@ impl Recovery {
                 let entries = self.leaf(storage, first, count);
                 for (block, entry) in (first.block..).zip(entries) {
                     let id = BlockId { block, ..first };
+                    let tiers = self.metadata.tiers(window);
                     // Blocks come after the one above them, in the order of their ids.
-                    let has_lost = id.tier < self.metadata.tiers(id.window)
-                        && lost.binary_search(&self.metadata.above(id)).is_ok();
-                    match if has_lost { None } else { self.block(storage, id, entry)? } {
+                    let begins_intact = |block: &EncodedBlock| {
+                        !block.begins_above(tiers) || lost.binary_search(&self.metadata.above(id)).is_err()
+                    };
+                    match self.block(storage, id, entry)?.filter(begins_intact) {
                         Some(block) => {
                             end.add(&block);
                             writer.append(&block)?;
@@ -224,7 +226,7 @@ impl Recovery {
             check_payload(&geometry, part, &raw).map_err(Error::Invalid)?;
             Ok(EncodedPart { kind, stats, raw_len, stored })
         };
-        entry.check().map_err(Error::Invalid)?;
+        entry.check(geometry.window.tiers()).map_err(Error::Invalid)?;
         let parts = entry.parts.iter().map(part).collect::<Result<_>>()?;
         Ok(EncodedBlock { id: entry.id, stats: entry.stats, parts })
     }
@@ -326,8 +328,11 @@ impl FoundSections {
             .ok_or_else(|| unrecoverable("start and metadata are missing, so the size of the volume is unknown"))?;
         let mut undescribed = Vec::new();
         let count = windows.last_key_value().map_or(0, |(number, _)| u64::from(*number) + 1);
-        let per_window = u64::from(all.blocks_per_channel(0)) * u64::from(all.channels);
-        let least = count.saturating_mul(per_window.saturating_mul(MIN_BLOCK).saturating_add(MIN_WINDOW));
+        let of_tier = |tier| u64::from(all.blocks_per_channel(tier)) * u64::from(all.channels);
+        let above = |record: &WindowRecord| (1..=record.window.tiers()).map(of_tier).fold(0, u64::saturating_add);
+        let blocks_above = windows.values().map(above).fold(0, u64::saturating_add);
+        let per_window = of_tier(0).saturating_mul(MIN_BLOCK).saturating_add(MIN_WINDOW);
+        let least = count.saturating_mul(per_window).saturating_add(blocks_above.saturating_mul(MIN_BLOCK));
         if least > len.saturating_mul(MAX_LOST_RATIO) {
             return Err(unrecoverable("the file is too short for the number of blocks in its records"));
         }

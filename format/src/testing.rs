@@ -79,10 +79,11 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
     let mut bytes = Random(random.below(u64::MAX) | 1);
     let mut bytes = |count: usize| -> Vec<u8> { (0..count * size).map(|_| bytes.below(256) as u8).collect() };
     let mut found = Content::default();
-    if random.below(4) == 0 {
+    let has_samples = geometry.tier == 0;
+    if has_samples && random.below(4) == 0 {
         found.missing = Some((0..total).map(|i| i % 3 == 0).collect()).map(|mask| (mask, bytes(total.div_ceil(3))));
     }
-    let exact = random.below(5) == 0;
+    let exact = has_samples && random.below(5) == 0;
     let scale = if exact { 1 } else { [1, 5, 9_000, 100_000_000][random.below(4) as usize] };
     let mut code = || (random.below(scale) as i32).wrapping_sub(scale as i32 / 2);
     let codes =
@@ -90,7 +91,7 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
     found.levels = (0..geometry.window.parts() as u8).map(codes).collect();
     if exact {
         found.exact = Some(bytes(total));
-    } else if random.below(2) == 0 {
+    } else if has_samples && random.below(2) == 0 {
         let positions: Vec<u32> = (0..total as u32).step_by(3).collect();
         found.outliers = Outliers { samples: bytes(positions.len()), positions };
     }
@@ -147,6 +148,7 @@ pub(crate) fn encode(
         part(PartKind::Exact, samples.len() / size, 0.0, 0.0, &raw);
     }
     let stats = BlockStats { step: 0.5, min: -1.0, max: 2.0, reached: 0.125, squared_error: 0.5, dropped: 0.25 };
+    let stats = if id.tier > 0 { BlockStats { step: 0.5, ..BlockEntry::lost(id).stats } } else { stats };
     EncodedBlock { id, stats, parts }
 }
 

@@ -4,6 +4,7 @@ use crate::bytes::{ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::limits::*;
 use crate::pyramid::Packing;
 use crate::record::{decode_exact, encode};
+use crate::section::FRAME;
 use crate::{BlockStats, EncodedBlock, Features, PartKind, Pyramid};
 use bincode::{Decode, Encode};
 
@@ -116,6 +117,15 @@ pub struct WindowEnd {
 pub(crate) const WINDOW_END: usize = 4 + 8 * 8;
 
 impl WindowRecord {
+    /// Bytes that a window takes in a file beside its blocks and leaves: its section and its end, and both in the metadata.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`](crate::Error::Invalid) if it cannot be stored.
+    pub fn stored_len(&self) -> crate::Result<u64> {
+        let record = self.encode().map_err(crate::Error::Invalid)?.len();
+        Ok(2 * (align((FRAME + record) as u64) + align((FRAME + WINDOW_END) as u64)))
+    }
+
     pub(crate) fn encode(&self) -> ParseResult<Vec<u8>> {
         encode(self, "window")
     }

@@ -225,8 +225,9 @@ fn damaged_channels_are_named_left_out_and_recovered() {
     let file = work.read("a.wspl");
     let mut bad = file.clone();
     let blocks: Vec<usize> = file.windows(4).enumerate().filter(|(_, w)| w == b"BLCK").map(|(at, _)| at).collect();
-    assert_eq!(blocks.len(), 5 * 3 * 3 * 2 * 2);
-    let lost = 12 + 5; // in the first window's second channel
+    let above = 2 + 1; // in every channel
+    assert_eq!(blocks.len(), 5 * 3 * (above + 3 * 2 * 2));
+    let lost = 3 * above + 12 + 5; // in the first window's second channel
     let middle = blocks[lost].midpoint(blocks[lost + 1]);
     bad[middle..middle + 8].iter_mut().for_each(|byte| *byte ^= 0x55);
     work.write("bad.wspl", &bad);
@@ -240,7 +241,7 @@ fn damaged_channels_are_named_left_out_and_recovered() {
     let run: Run = work.wavesplat("recover bad.wspl -o saved.wspl --json");
     let lost = serde_json::json!([{ "window": 0, "frames": [0, 8], "first": 5, "last": 5, "channel": "green" }]);
     assert_eq!(run.json()["lost"], lost);
-    run.finds(3, &["1 of 180 blocks are lost"]);
+    run.finds(3, &["1 of 225 blocks are lost"]);
     let said = work.wavesplat("recover bad.wspl -o saved2.wspl").finds(3, &["lost"]);
     assert!(said.code == Some(3));
     work.wavesplat("verify saved.wspl").finds(3, &["saved.wspl"]);

@@ -22,8 +22,8 @@ fn write_sparse(work: &Work, name: &str, [nx, ny, nz, nt]: [usize; 4]) {
 #[test]
 fn archives_much_larger_than_the_budget_stay_within_it() {
     let work = Work::new();
-    work.write("tiny.raw", [0; 16 * 16 * 16 * 2 * 4]);
-    let tiny = "tiny.raw --dims 16x16x16x2 --dtype f32";
+    work.write("tiny.raw", [0; 32 * 16 * 16 * 2 * 4]);
+    let tiny = "tiny.raw --dims 32x16x16x2 --dtype f32"; // two blocks, and one above them
     let ask = work.wavesplat(&format!("convert {tiny} -o t.wspl --block 16 --threads 2 --memory 1MiB"));
     let memory = ask.fails(2, &["--memory"]).mebibytes();
     let frame_mib = (20 * memory).div_ceil(32);

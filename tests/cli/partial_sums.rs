@@ -392,8 +392,9 @@ fn sums_report_the_damage_that_a_part_left_out() {
     work.write("a.npy", Archive::smooth([20, 14, 10], 16).npy());
     work.wavesplat("convert a.npy -o a.wspl --window 8 --block 8").ok();
     let mut bytes = work.read("a.wspl");
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
+    let blocks: Vec<usize> = bytes.windows(4).enumerate().filter(|(_, w)| w == b"BLCK").map(|(at, _)| at).collect();
+    let largest = blocks.windows(2).max_by_key(|ends| ends[1] - ends[0]).unwrap();
+    bytes[largest[0].midpoint(largest[1])] ^= 1;
     work.write("a.wspl", &bytes);
     work.render("a.wspl --skip-damaged --partial --size 20x20 -o a.wpart").fails(3, &["damaged blocks were left out"]);
     work.render("--sum a.wpart -o a_%02d.png").fails(3, &["a.wpart: a.wspl: ", "damaged blocks were left out"]);

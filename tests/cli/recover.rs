@@ -15,6 +15,10 @@ fn of_place(file: &[u8], tag: &[u8; 4], number: usize) -> usize {
     file.windows(4).enumerate().filter(|(_, bytes)| bytes == tag).nth(number).unwrap().0
 }
 
+/// Blocks of a window that lie above those of all voxels, and all.
+const ABOVE: usize = 5;
+const ALL: usize = ABOVE + 24;
+
 #[test]
 fn without_its_directory_a_file_is_recovered_to_the_same_bytes() {
     let (work, file) = work();
@@ -51,10 +55,10 @@ fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
     work.wavesplat("extract saved.wspl -o saved.raw").ok();
     work.wavesplat("extract a.wspl -o a.raw --frames 0:16").ok();
     assert!(work.read("saved.raw") == work.read("a.raw"));
-    work.write("within.wspl", &file[..of_place(&file, b"BLCK", 24 + 20)]);
+    work.write("within.wspl", &file[..of_place(&file, b"BLCK", ALL + ABOVE + 20)]);
     let run = work.wavesplat("recover within.wspl -o within-saved.wspl --json");
     let report = run.json();
-    run.finds(3, &["4 of 48 blocks are lost"]);
+    run.finds(3, &["4 of 58 blocks are lost"]);
     let lost = serde_json::json!({ "window": 1, "frames": [8, 16], "first": 20, "last": 23 });
     assert_eq!((&report["blocks_lost"], &report["all_known"], &report["lost"][0]), (&4.into(), &false.into(), &lost));
     work.write("b.wspl.part", &file[..of_place(&file, b"WEND", 2)]);
@@ -67,10 +71,10 @@ fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
 fn a_damaged_block_is_lost_and_all_others_are_shown() {
     let (work, file) = work();
     let mut bad = file.clone();
-    let at = of_place(&file, b"BLCK", 24 + 7) + 500; // in a part of block 7 of window 1
+    let at = of_place(&file, b"BLCK", ALL + ABOVE + 7) + 300; // in a part of block 7 of window 1
     bad[at] ^= 1;
     work.write("bad.wspl", &bad);
-    work.wavesplat("recover bad.wspl -o saved.wspl").finds(3, &["1 of 120 blocks are lost"]);
+    work.wavesplat("recover bad.wspl -o saved.wspl").finds(3, &["1 of 145 blocks are lost"]);
     work.wavesplat("verify saved.wspl").finds(3, &["window 1 block 7", "lost before the file was written"]);
     work.wavesplat("verify bad.wspl").finds(3, &["window 1 block 7", "checksum"]);
     let shown = |name: &str| {
@@ -110,6 +114,37 @@ fn a_damaged_block_is_lost_and_all_others_are_shown() {
     work.render("bad.wspl --frames 0 --size 40x40 -o first.npy").ok(); // this frame does not include the block
 }
 
+/// A block of tier 1 holds what is coarse in 2 x 2 x 2 blocks.
+#[test]
+fn a_damaged_block_above_others_loses_only_those_below_it() {
+    let (work, file) = work();
+    let mut bad = file.clone();
+    let header = 24 + 64 + 56; // with one part at least
+    bad[of_place(&file, b"BLCK", ALL + 1 + 1) + header + 56] ^= 1; // block 1 of tier 1 of window 1
+    work.write("bad.wspl", &bad);
+    let run = work.wavesplat("recover bad.wspl -o saved.wspl");
+    let lost = run.text().to_string();
+    run.finds(3, &["9 of 145 blocks are lost"]);
+    assert!(lost.contains("window 1 (frames 8..16), blocks 1 to 1 of tier 1\n"), "{lost}");
+    assert!(lost.contains("window 1 (frames 8..16), blocks 2 to 3\n"), "{lost}");
+    let run = work.wavesplat("verify bad.wspl");
+    assert!(run.text().contains("8 more blocks could not be checked"), "{}", run.text());
+    run.finds(3, &["damaged in 1 place", "block 1 channel 0 tier 1", "checksum"]);
+    work.wavesplat("extract a.wspl -o whole.npy").ok();
+    let whole = floats(&read_npy(&work.read("whole.npy")).1);
+    for name in ["bad.wspl", "saved.wspl"] {
+        work.wavesplat(&format!("extract {name} -o out.npy --force")).fails(3, &[name, "window 1"]);
+        work.wavesplat(&format!("extract {name} -o out.npy --force --skip-damaged")).fails(3, &["8 damaged blocks"]);
+        for (i, (found, v)) in floats(&read_npy(&work.read("out.npy")).1).iter().zip(&whole).enumerate() {
+            let (frame, x, y) = (i / 3360, i % 24, i / 24 % 14);
+            let is_below = (8..16).contains(&frame) && x >= 12 && y < 12;
+            let same = if is_below { found.is_nan() } else { found.to_bits() == v.to_bits() };
+            assert!(same, "{name}, sample {i}: {found}, not {v}");
+        }
+        work.wavesplat(&format!("extract {name} --frames 16:24 -o later.npy --force")).ok();
+    }
+}
+
 #[test]
 fn unrecoverable_files_are_reported() {
     let (work, file) = work();
@@ -118,11 +153,11 @@ fn unrecoverable_files_are_reported() {
     work.write("start.wspl", &file[..700]);
     work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be recovered"]);
     let mut newer = file.clone();
-    newer[16] = 4; // a feature of a later version
+    newer[16] = 8; // a feature of a later version
     let sum = xxhash_rust::xxh3::xxh3_64(&newer[..120]).to_le_bytes();
     newer[120..128].copy_from_slice(&sum);
     work.write("newer.wspl", &newer);
-    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 2"]);
+    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 3"]);
     work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace the input"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "newer.wspl", "start.wspl", "text.wspl"]);
 }

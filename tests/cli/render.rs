@@ -230,7 +230,9 @@ fn a_coarse_picture_has_the_framing_of_the_whole() {
         work.render(&command).ok();
         floats(&read_npy(&work.read("all.npy")).1)
     };
-    for mode in ["", "--mode mip", "--mode composite --transfer-function turbo", "--region 2:18,:,1:9"] {
+    for mode in
+        ["", "--mode mip", "--mode composite --transfer-function turbo --opacity 0:0,1:1", "--region 2:18,:,1:9"]
+    {
         let whole = picture(&work, mode);
         let coarse = picture(&work, &format!("{mode} --lod 1"));
         assert_eq!(coarse.len(), whole.len(), "{mode}");

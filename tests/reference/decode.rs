@@ -197,7 +197,7 @@ impl Pyramid {
 }
 
 /// The number of a node.
-pub(crate) fn number(extents: [usize; 4], node: [usize; 4]) -> usize {
+fn number(extents: [usize; 4], node: [usize; 4]) -> usize {
     node[0] + extents[0] * (node[1] + extents[1] * (node[2] + extents[2] * node[3]))
 }
 

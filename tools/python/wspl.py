@@ -1336,8 +1336,11 @@ class Archive:
         return self.block(b.window, b.tier + 1, b.channel, self.metadata.above(b.block, b.tier))
 
     def lost(self, b: Block | None) -> bool:
-        """Whether a block, or one above it, is lost."""
-        return b is not None and (bool(b.lost) or self.lost(self.above(b)))
+        """Whether a block is lost, or begins with the nodes of one that is."""
+        if b is None or b.lost:
+            return b is not None
+        is_exact = any(p.kind == EXACT for p in b.parts)
+        return (b.tier > 0 or b.step > 0 and not is_exact) and self.lost(self.above(b))
 
     def payload(self, b: Block, p) -> bytes:
         """The content of a part after decompression."""

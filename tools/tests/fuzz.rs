@@ -124,6 +124,7 @@ fn seeds_are_made() {
         ("exact", exact),
         ("nested", nested(Basis::Samples, SampleType::F32)),
         ("ghosts", nested(Basis::Learned, SampleType::F64)),
+        ("tiers", tiered()),
     ];
     let mut corpus = Vec::new();
     for (name, file) in &files {
@@ -183,6 +184,13 @@ fn description(file: &[u8]) -> Vec<u8> {
 fn nested(basis: Basis, sample: SampleType) -> Vec<u8> {
     let mut case = case(sample, basis, 9, 1e-3);
     case.config.block = Some(4);
+    case.convert().unwrap()
+}
+
+/// A file of version 1.2 with three tiers.
+fn tiered() -> Vec<u8> {
+    let mut case = case(SampleType::F32, Basis::Samples, 5, 1e-2);
+    case.config.block = Some(2);
     case.convert().unwrap()
 }
 

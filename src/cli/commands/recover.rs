@@ -81,7 +81,8 @@ fn text(r: &RecoverReport) -> String {
         let (from, to) = run.frames;
         let (window, first, last) = (run.window, run.first, run.last);
         let channel = run.channel.map_or(String::new(), |channel| format!(" of {channel}"));
-        text += &format!("  lost: window {window} (frames {from}..{to}), blocks {first} to {last}{channel}\n");
+        let tier = if run.tier > 0 { format!(" of tier {}", run.tier) } else { String::new() };
+        text += &format!("  lost: window {window} (frames {from}..{to}), blocks {first} to {last}{tier}{channel}\n");
     }
     for window in &r.windows_undescribed {
         text += &format!("  the record of window {window} is lost\n");

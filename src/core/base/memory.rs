@@ -6,5 +6,10 @@ pub const DEFAULT: usize = 512 << 20;
 /// Bytes of a budget that are reserved for the program, stacks and directories.
 pub const FIXED: usize = 8 << 20;
 
+/// The least budget that suffices if `needs` of a budget grow with it, but by less than it does.
+pub fn least(needs: impl Fn(usize) -> usize) -> usize {
+    (0..32).fold(0, |budget, _| needs(budget))
+}
+
 /// Largest number of blocks in work at a time: enough to keep all threads busy. More would only delay the first result.
 pub const MOST_BLOCKS: usize = 64;

@@ -24,10 +24,17 @@ impl<T: Pooled> Buffer<T> {
     }
 }
 
-impl<T: Pooled> FromIterator<T> for Buffer<T> {
-    fn from_iter<I: IntoIterator<Item = T>>(values: I) -> Self {
-        let values: Vec<T> = values.into_iter().collect();
-        Self { len: values.len(), values }
+impl<T: Pooled> From<&[T]> for Buffer<T> {
+    fn from(values: &[T]) -> Self {
+        let mut copy = Self::with_len(values.len());
+        copy.copy_from_slice(values);
+        copy
+    }
+}
+
+impl<T: Pooled> Clone for Buffer<T> {
+    fn clone(&self) -> Self {
+        self[..].into()
     }
 }
 

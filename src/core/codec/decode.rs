@@ -26,7 +26,7 @@ pub struct Block {
     pub step: f64,
     /// The codes of the level parts that were read.
     pub codes: Codes,
-    /// The block above, if the codes need it.
+    /// The nodes of the block above, if the codes need them.
     pub above: Option<Above>,
     /// Samples stored exactly because their decoded values miss the bound.
     pub outliers: Outliers,
@@ -39,8 +39,8 @@ pub struct Block {
 }
 
 impl Block {
-    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples. `above` is
-    /// the block above, if the window has tiers.
+    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples. `above` are
+    /// the nodes of the block above, if the window has tiers.
     pub fn read<S: Storage>(
         reader: &Reader<S>,
         codec: &WindowCodec,
@@ -172,7 +172,10 @@ impl Block {
             return Ok(codes);
         }
         let decoded = self.decoded_voxels(codec);
-        Ok(codes.chunks_exact(all).flat_map(|of_k| decoded.iter().map(|voxel| of_k[*voxel])).collect())
+        let mut thinned = Buffer::with_len(codec.basis.coefficients() * decoded.len());
+        let of_all = codes.chunks_exact(all).flat_map(|of_k| decoded.iter().map(|voxel| of_k[*voxel]));
+        thinned.iter_mut().zip(of_all).for_each(|(to, code)| *to = code);
+        Ok(thinned)
     }
 
     /// The numbers of the voxels that are decoded, among all.
@@ -227,7 +230,7 @@ impl Block {
     pub fn set_codes(&mut self, codec: &WindowCodec, codes: &[i32]) {
         self.codes = match &codec.scheme.pyramid {
             Some(pyramid) => Codes::Sparse(codec.passes(pyramid, self.of).list(codes)),
-            None => Codes::Dense(codes.iter().copied().collect()),
+            None => Codes::Dense(codes.into()),
         };
     }
 
@@ -257,7 +260,8 @@ impl Block {
     pub fn held_bytes(&self) -> usize {
         let overrides = self.missing.0.len() + self.missing.1.len() + self.outliers.samples.len();
         let exact = self.exact.as_ref().map_or(0, Vec::len);
-        self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact
+        let above = self.above.as_ref().map_or(0, Above::held_bytes);
+        above + self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact
     }
 
     /// Whether all coefficients are zero.

@@ -3,16 +3,15 @@
 use super::WindowCodec;
 use super::buffer::Buffer;
 use super::codes::Codes;
-use super::pyramid::{Known, Nodes, PARTS, PredictionPasses};
+use super::pyramid::{Nodes, PARTS, PredictionPasses};
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
-use std::sync::Arc;
 use wavesplat_format::{Pyramid, SparseCodes};
 
 /// The decoded coefficients of a block.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Field<'a> {
     values: Values<'a>,
     /// Whether each k may have coefficients that are not zero.
@@ -20,7 +19,7 @@ pub struct Field<'a> {
 }
 
 /// `k * voxels + voxel`
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 enum Values<'a> {
     /// All are zero.
     Zero,
@@ -37,30 +36,44 @@ enum Values<'a> {
     Double(Buffer<f64>),
 }
 
-/// The decoded block above, and where a block lies in it.
-#[derive(Debug, Clone)]
+/// The decoded nodes that a block begins with: those of the block above that lie in it.
+#[derive(Debug)]
 pub struct Above {
-    /// The nodes of the block above.
-    pub field: Arc<Field<'static>>,
-    /// The number of these nodes along x, y, z.
-    pub size: [usize; 3],
-    /// The first of them that lies in the block.
-    pub start: [usize; 3],
+    nodes: Field<'static>,
+    /// Their number along x, y, z.
+    size: [usize; 3],
 }
 
 impl Above {
-    /// The known nodes of a block that is coded in 32-bit floats.
-    pub(super) fn singles(&self) -> Known<'_, f32> {
-        self.known(self.field.singles())
+    /// Copies the `size` nodes from `start` on out of the block above, which has `outer` nodes along x, y, z.
+    pub fn new(above: &Field<'_>, outer: [usize; 3], start: [usize; 3], size: [usize; 3]) -> Self {
+        fn cut<R: Real>(values: &[R], [outer, start, size]: [[usize; 3]; 3], ks: usize) -> Buffer<R> {
+            let mut nodes = Buffer::with_len(size.iter().product::<usize>() * ks);
+            Nodes { values, size: outer }.copy(start, size, &mut nodes);
+            nodes
+        }
+        let (places, ks) = ([outer, start, size], above.marked.len());
+        let values = match &above.values {
+            Values::Single(values) => Values::Single(cut(values, places, ks)),
+            Values::Double(values) => Values::Double(cut(values, places, ks)),
+            Values::Zero | Values::Codes { .. } => Values::Zero,
+        };
+        Self { nodes: Field { values, marked: above.marked.clone() }, size }
     }
 
-    /// The known nodes of a block that is coded in 64-bit floats.
-    pub(super) fn doubles(&self) -> Known<'_, f64> {
-        self.known(self.field.doubles())
+    /// Bytes of memory that they take.
+    pub(super) fn held_bytes(&self) -> usize {
+        self.nodes.held_bytes()
     }
 
-    fn known<'a, R>(&self, values: Option<&'a [R]>) -> Known<'a, R> {
-        Known { nodes: Nodes { values: values.unwrap_or_default(), size: self.size }, start: self.start }
+    /// The nodes of a block that is coded in 32-bit floats.
+    pub(super) fn singles(&self) -> Nodes<'_, f32> {
+        Nodes { values: self.nodes.singles().unwrap_or_default(), size: self.size }
+    }
+
+    /// The nodes of a block that is coded in 64-bit floats.
+    pub(super) fn doubles(&self) -> Nodes<'_, f64> {
+        Nodes { values: self.nodes.doubles().unwrap_or_default(), size: self.size }
     }
 }
 
@@ -89,7 +102,7 @@ impl<'a> Plane<'a> {
     /// Decodes one k of a block. Each k must be coded by itself.
     pub(super) fn decode(
         codec: &WindowCodec,
-        of: Stored<'_>,
+        of: Stored<'a>,
         k: usize,
         single: &'a mut Vec<f32>,
         double: &'a mut Vec<f64>,
@@ -100,34 +113,14 @@ impl<'a> Plane<'a> {
             return Self::scaled(step, codes.dense().get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
         };
         if codec.is_all_above() {
-            let size = codec.decoded_size(size);
-            return above.map_or(Self::Zero, |above| Self::copied(above, pyramid.single, size, k, single, double));
+            let nodes = codec.decoded_size(size).iter().product();
+            return above.map_or(Self::Zero, |above| above.nodes.plane(k, nodes, double));
         }
         let (passes, codes) = (codec.passes(pyramid, size), codes.sparse());
         match pyramid.single {
             true if passes.decode_one(k, step, codes, above.map(Above::singles), single) => Self::Single(single),
             false if passes.decode_one(k, step, codes, above.map(Above::doubles), double) => Self::Double(double),
             _ => Self::Zero,
-        }
-    }
-
-    /// The nodes of one k that the block above has.
-    fn copied(
-        above: &Above,
-        is_single: bool,
-        size: [usize; 3],
-        k: usize,
-        single: &'a mut Vec<f32>,
-        double: &'a mut Vec<f64>,
-    ) -> Self {
-        fn copy<'a, R: Real>(known: Known<'_, R>, size: [usize; 3], k: usize, out: &'a mut Vec<R>) -> &'a [R] {
-            out.resize(size.iter().product(), R::default());
-            known.copy(size, k..k + 1, out);
-            out
-        }
-        match is_single {
-            true => Self::Single(copy(above.singles(), size, k, single)),
-            false => Self::Double(copy(above.doubles(), size, k, double)),
         }
     }
 
@@ -151,6 +144,9 @@ impl Field<'static> {
         above: Option<&Above>,
         wanted: &[bool],
     ) -> Self {
+        if let Some(above) = above.filter(|_| codec.is_all_above()) {
+            return above.nodes.clone();
+        }
         let of = Refined { codec, size, step, codes, wanted };
         let (values, marked) = match &codec.scheme.pyramid {
             Some(pyramid) if pyramid.single => of.values(pyramid, above.map(Above::singles), Values::Single),
@@ -163,8 +159,8 @@ impl Field<'static> {
     /// The decoded nodes of a block of a tier above 0, as its encoder has them.
     pub(super) fn coarse(single: Option<&[f32]>, double: &[f64], ks: usize) -> Self {
         let values = match single {
-            Some(values) => Values::Single(values.iter().copied().collect()),
-            None => Values::Double(double.iter().copied().collect()),
+            Some(values) => Values::Single(values.into()),
+            None => Values::Double(double.into()),
         };
         Self { values, marked: vec![true; ks] }
     }
@@ -371,7 +367,7 @@ impl Refined<'_> {
     fn values<'v, R: Real>(
         &self,
         pyramid: &Pyramid,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         values: fn(Buffer<R>) -> Values<'v>,
     ) -> (Values<'v>, Vec<bool>) {
         let &Self { codec, size, step, codes, wanted } = self;
@@ -380,10 +376,6 @@ impl Refined<'_> {
             return (Values::Zero, vec![false; ks]);
         }
         let mut field = Buffer::with_len(nodes.iter().product::<usize>() * ks);
-        if let Some(known) = known.filter(|_| codec.is_all_above()) {
-            known.copy(nodes, 0..ks, &mut field);
-            return (values(field), vec![true; ks]);
-        }
         let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
         (values(field), marked)
     }

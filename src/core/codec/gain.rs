@@ -18,14 +18,15 @@ impl WindowCodec {
         }
     }
 
-    /// The largest coefficient that predictions give a block that begins with nodes of at most 1: the sum of absolute weights of eq
-    /// 33, pass after pass.
+    /// The largest coefficient that predictions give a block of the codec's tier that begins with nodes of at most 1: the sum of
+    /// absolute weights of eq 33, pass after pass.
     pub fn prediction_gain(&self) -> f64 {
         let Some(pyramid) = &self.scheme.pyramid else { return 1.0 };
-        let in_space: f64 = match (pyramid.ghosts, pyramid.stencil) {
-            (false, _) => 2.0, // the last node is extrapolated
-            (true, Stencil::Cubic) => 1.25,
-            (true, Stencil::Linear) => 1.0,
+        let is_interpolated = pyramid.ghosts && self.tier == 0; // others may extrapolate their last node
+        let in_space: f64 = match pyramid.stencil {
+            _ if !is_interpolated => 2.0,
+            Stencil::Cubic => 1.25,
+            Stencil::Linear => 1.0,
         };
         let along_time = if pyramid.order.contains(&Axis::T) { 2_u64 << pyramid.tiers } else { 1 };
         in_space * in_space * in_space * along_time as f64

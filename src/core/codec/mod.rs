@@ -41,7 +41,7 @@ use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 #[derive(Debug, Clone)]
 pub struct WindowCodec {
     /// How blocks are coded.
-    pub scheme: Scheme,
+    pub scheme: Arc<Scheme>,
     /// The temporal basis.
     pub basis: Arc<dyn TimeBasis>,
     /// The basis functions: `synthesis[k][t]` is u_k(t).
@@ -83,6 +83,7 @@ impl WindowCodec {
         let gain = wavelet::gain(&synthesis);
         let levels = wavelet::ranges(levels);
         let (basis, synthesis) = (Arc::from(basis), Arc::new(synthesis));
+        let scheme = Arc::new(scheme);
         Self { scheme, basis, synthesis, gain, sample, bound, missing_value: None, clip: None, levels, lod: 0, tier: 0 }
     }
 
@@ -123,6 +124,21 @@ impl WindowCodec {
     pub fn decoded_size(&self, size: [usize; 3]) -> [usize; 3] {
         let nodes = self.scheme.pyramid.as_ref().map_or(size, |pyramid| pyramid.nodes(size, self.tier));
         nodes.map(|n| n.div_ceil(1 << self.lod))
+    }
+
+    /// The codec of the blocks above, with whose nodes blocks begin; none in the last tier.
+    pub fn above(&self) -> Option<Self> {
+        let (tiers, lod) = (self.tiers(), self.lod);
+        let has_above = self.tier < tiers;
+        has_above.then(|| match lod {
+            0 => self.at(self.tier + 1, 0),
+            _ => self.at(tiers.min(lod as u8), lod.saturating_sub(tiers.into())),
+        })
+    }
+
+    /// The nodes along x, y, z that a block of `size` voxels begins with; `above` is [`Self::above`].
+    pub fn known_size(&self, above: &Self, size: [usize; 3]) -> [usize; 3] {
+        if self.is_all_above() { self.decoded_size(size) } else { above.decoded_size(size) }
     }
 
     /// The codec of a tier's blocks at a level of detail of their lattice.

@@ -10,7 +10,7 @@ use super::codes::PooledCodes;
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::load::{Missing, load_group};
-use super::pyramid::{Known, Nodes, PredictionPasses};
+use super::pyramid::{Nodes, PredictionPasses};
 use super::real::Real;
 use super::rows::Change;
 use super::truncate::Group;
@@ -77,7 +77,7 @@ impl Source<'_> {
         pyramid: &Pyramid,
         size: [usize; 3],
         outer: &Source<'_>,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         [source, field, split]: &mut [Vec<R>; 3],
         codes: &mut Vec<i32>,
     ) -> Option<Coded> {
@@ -142,7 +142,7 @@ impl Source<'_> {
         &self,
         weighing: &QuantizerSetup,
         passes: &PredictionPasses<'_>,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         field: &[R],
         codes: &[i32],
     ) -> Checked {

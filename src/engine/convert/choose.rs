@@ -183,7 +183,7 @@ impl SchemeSelector<'_> {
         match of_basis {
             Some(of_basis) => {
                 let codec = of_basis.codec.into_inner().unwrap_or_else(PoisonError::into_inner);
-                WindowCodec { scheme, ..codec }
+                WindowCodec { scheme: scheme.into(), ..codec }
             }
             None => self.codec(&scheme),
         }
@@ -408,7 +408,7 @@ impl SchemeSelector<'_> {
         let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
         let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
         let mut codec = of_basis.codec.lock().unwrap_or_else(PoisonError::into_inner);
-        codec.scheme = scheme.clone(); // with the same functions
+        codec.scheme = scheme.clone().into(); // with the same functions
         let codec = &*codec;
         let bytes = |b: &Trial<'_, R>| {
             let mut scratch = trials.idle.take().unwrap_or_default();

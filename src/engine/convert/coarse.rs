@@ -1,52 +1,105 @@
 //! The coded blocks of the tiers above 0 of a window, from which the blocks below are coded.
 
 use super::Plan;
+use super::plan::SPOOLED;
 use crate::file::above::{AboveBlocks, AboveKey, PlaceAbove};
 use std::collections::HashMap;
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
-use wavesplat_core::base::error::Result;
+use tempfile::{SpooledTempFile, spooled_tempfile};
+use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::{Above, Field};
-use wavesplat_format::{BlockId, EncodedBlock};
+use wavesplat_format::{BlockId, EncodedBlock, EncodedPart};
 
 /// The coded blocks of a window's tiers above 0. Some stay decoded.
 #[derive(Debug)]
 pub(super) struct CoarseBlocks {
-    coded: Mutex<HashMap<BlockId, Arc<EncodedBlock>>>,
+    coded: Mutex<CodedBlocks>,
     decoded: AboveBlocks,
 }
 
 impl CoarseBlocks {
-    /// Room for so many decoded blocks.
-    pub(super) fn new(most: usize) -> Self {
-        Self { coded: Mutex::default(), decoded: AboveBlocks::new(most) }
+    /// No blocks yet. Decoded ones take up to their share of the memory.
+    pub(super) fn new(memory: usize, plan: &Plan<'_>) -> Self {
+        Self { coded: Mutex::default(), decoded: AboveBlocks::within(memory, plan.bytes_above) }
     }
 
     /// Adds a coded block and its decoded nodes.
-    pub(super) fn add(&self, codec: &WindowCodec, block: &EncodedBlock, field: Field<'static>) {
+    pub(super) fn add(&self, codec: &WindowCodec, block: &EncodedBlock, field: Field<'static>) -> Result<()> {
         let (id, all) = (block.id, vec![true; codec.basis.coefficients()]);
-        self.coded.lock().unwrap_or_else(PoisonError::into_inner).insert(id, Arc::new(block.clone()));
-        _ = self.decoded.field(AboveKey { id, lod: 0, wanted: all }, || Ok(Arc::new(field)));
+        self.coded(|coded| coded.add(block))?;
+        self.decoded.field(AboveKey { id, lod: 0, wanted: all }, || Ok(Arc::new(field)))?;
+        Ok(())
     }
 
-    /// The nodes of the block above a block; none in the last tier.
+    /// The nodes that a block begins with; none in the last tier.
     pub(super) fn above(&self, plan: &Plan<'_>, codec: &WindowCodec, id: BlockId) -> Result<Option<Above>> {
-        if id.tier >= codec.tiers() {
-            return Ok(None);
-        }
-        let (tier, all) = (id.tier + 1, vec![true; codec.basis.coefficients()]);
-        let place = PlaceAbove::new(&plan.start, codec, id, tier, 0);
-        let key = AboveKey { id: place.id, lod: 0, wanted: all.clone() };
+        let codec = codec.at(id.tier, 0);
+        let Some(codec_above) = codec.above() else { return Ok(None) };
+        let place = PlaceAbove::new(&plan.start, &codec, &codec_above, id);
+        let all = vec![true; codec.basis.coefficients()];
         let decode = || {
-            let codec = codec.at(tier, 0);
             let above = self.above(plan, &codec, place.id)?;
-            let coded = self.coded.lock().unwrap_or_else(PoisonError::into_inner).get(&place.id).cloned();
-            let coded = coded.expect("blocks of a tier are coded before those below");
-            let block = Block::from_encoded(&codec, &coded, plan.size(place.id), above).map_err(super::bug)?;
-            Ok(Arc::new(block.refined(&codec, &all)))
+            let coded = self.coded(|coded| coded.block(place.id))?;
+            let block = Block::from_encoded(&codec_above, &coded, plan.size(place.id), above).map_err(super::bug)?;
+            Ok(Arc::new(block.refined(&codec_above, &all)))
         };
-        let field = self.decoded.field(key, decode)?;
-        Ok(Some(place.with(field)))
+        let field = self.decoded.field(AboveKey { id: place.id, lod: 0, wanted: all.clone() }, decode)?;
+        Ok(Some(place.cut(&field)))
+    }
+
+    fn coded<T>(&self, with: impl FnOnce(&mut CodedBlocks) -> io::Result<T>) -> Result<T> {
+        let mut coded = self.coded.lock().unwrap_or_else(PoisonError::into_inner);
+        with(&mut coded).map_err(|e| Error::io(std::env::temp_dir(), "using a temporary file", e))
+    }
+}
+
+/// Coded blocks, their bytes one after another.
+#[derive(Debug)]
+struct CodedBlocks {
+    blocks: HashMap<BlockId, CodedBlock>,
+    bytes: SpooledTempFile,
+}
+
+/// A block whose bytes are elsewhere.
+#[derive(Debug)]
+struct CodedBlock {
+    /// Where they begin.
+    start: u64,
+    /// The number of bytes of each part.
+    lengths: Vec<usize>,
+    /// The rest.
+    block: EncodedBlock,
+}
+
+impl Default for CodedBlocks {
+    fn default() -> Self {
+        Self { blocks: HashMap::new(), bytes: spooled_tempfile(SPOOLED) }
+    }
+}
+
+impl CodedBlocks {
+    fn add(&mut self, block: &EncodedBlock) -> io::Result<()> {
+        let start = self.bytes.seek(SeekFrom::End(0))?;
+        block.parts.iter().try_for_each(|part| self.bytes.write_all(&part.stored))?;
+        let lengths = block.parts.iter().map(|part| part.stored.len()).collect();
+        let parts = block.parts.iter().map(|part| EncodedPart { stored: Vec::new(), ..*part }).collect();
+        let block = EncodedBlock { parts, ..*block };
+        self.blocks.insert(block.id, CodedBlock { start, lengths, block });
+        Ok(())
+    }
+
+    fn block(&mut self, id: BlockId) -> io::Result<EncodedBlock> {
+        let CodedBlock { start, lengths, block } =
+            self.blocks.get(&id).expect("blocks of a tier are coded before those below");
+        let mut block = block.clone();
+        self.bytes.seek(SeekFrom::Start(*start))?;
+        for (part, length) in block.parts.iter_mut().zip(lengths) {
+            part.stored.resize(*length, 0);
+            self.bytes.read_exact(&mut part.stored)?;
+        }
+        Ok(block)
     }
 }

@@ -2,18 +2,14 @@
 
 use super::coded_input::CodedInput;
 use super::gather::{Batch, WindowReader};
-use super::record::WindowWriter;
+use super::record::window_record;
 use super::spread::evenly;
 use super::variation::Variation;
-use super::warnings::Findings;
-use super::{ConvertConfig, EncodedBatch, Encoders, Plan, Pool, Target, WindowJob, WindowsDone, encode_batch};
+use super::{ConvertConfig, Encoders, Plan, Pool, WindowJob, WindowsDone, bug, encode_batch};
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::io;
 use std::ops::Range;
-use std::path::Path;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::output::STANDARD;
@@ -85,6 +81,7 @@ pub fn estimates(
     let is_rough = source_archive.grid.whole().voxels().saturating_mul(frames) > FEW_SAMPLES;
     let all = plan.blocks.len().saturating_mul(frames.div_ceil(first.config.window));
     let most = if is_rough { blocks_of_window(all, windows.len() * configs.len()) } else { BLOCKS };
+    let most = if plan.tiers() > 0 { most / 2 } else { most }; // and those above
     let blocks = some_blocks(&plan.blocks, most);
     progress.start(Some((windows.len() * configs.len()) as u64));
     let read = FramesRead {
@@ -102,7 +99,7 @@ pub fn estimates(
         let range = *input.config.range.get_or_insert(found);
         let (config, archive) = (&input.config, &input.archive);
         let coded = BlocksCoded { input: &input, plan: &plan, blocks: &blocks, range: found, is_rough };
-        let bytes = scaled(coded.bytes(source, &windows, &mut scheme, progress)?, &coded, &windows, frames);
+        let bytes = coded.bytes(source, &windows, frames, &mut scheme, progress)?;
         let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
         let error = range_bound(config.tolerance, range);
         let lost = variation.share_below(error).filter(|_| input.colour_transform.is_none());
@@ -113,14 +110,6 @@ pub fn estimates(
     let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>()?;
     progress.finish();
     Ok(estimates)
-}
-
-/// The bytes of all `frames`, if those of some blocks in some windows take `bytes`.
-fn scaled(bytes: u64, coded: &BlocksCoded<'_>, windows: &[Range<usize>], frames: usize) -> f64 {
-    let voxels = coded.blocks.iter().map(|block| coded.plan.blocks.region(*block).voxels()).sum::<usize>();
-    let samples = voxels * windows.iter().map(ExactSizeIterator::len).sum::<usize>();
-    let all = coded.input.archive.grid.whole().voxels() as f64 * frames as f64;
-    bytes as f64 * all / samples as f64
 }
 
 /// The number of blocks to code in each of some windows, if those of an archive are `all`.
@@ -200,7 +189,7 @@ impl FramesRead<'_> {
     }
 }
 
-/// The blocks that are coded, as if they were all of a file.
+/// The blocks that are coded, as those of a file.
 struct BlocksCoded<'a> {
     /// With the range that was found, if none is given.
     input: &'a CodedInput,
@@ -212,64 +201,79 @@ struct BlocksCoded<'a> {
     is_rough: bool,
 }
 
+/// The compressed share of a leaf of the directory, as measured on files of many kinds.
+const LEAF_SHARE: f64 = 0.5;
+
 impl BlocksCoded<'_> {
-    /// The bytes of a file of these blocks in these windows. Rough choices begin with `scheme`, and leave the last one.
+    /// The bytes of a file of all `frames`, from those of some blocks in some windows. Rough choices begin with `scheme`, and leave
+    /// the last one.
     fn bytes(
         &self,
         source: &mut dyn FrameSource,
         windows: &[Range<usize>],
+        frames: usize,
         scheme: &mut Option<Scheme>,
         progress: &dyn Progress,
-    ) -> Result<u64> {
-        let started = Instant::now();
-        let plan = self.plan.for_blocks(self.blocks.len());
-        let target = Target { name: Path::new("estimate"), out: io::sink(), resume_from: None };
-        let mut file = WindowWriter::new(self.input, &plan, target);
-        let (done, idle, encoders) = (WindowsDone::default(), Pool::default(), Encoders::default());
+    ) -> Result<f64> {
+        let (done, idle) = (WindowsDone::default(), Pool::default());
         let mut reader = WindowReader::new(self.input, self.plan, &done, &idle);
-        reader.code_some_blocks();
         if self.is_rough {
             reader.choose_roughly(scheme.take());
         }
+        let mut bytes = 0.0;
         for (index, frames) in windows.iter().enumerate() {
             let window = source.window(frames.start, frames.len())?;
             let job = Arc::new(reader.job(window.as_ref(), index, &Scan { range: self.range, ..Scan::NOTHING })?);
-            *scheme = Some(job.codec.scheme.clone());
-            for batch in self.batches(&reader, window.as_ref(), &job) {
-                let encoded = encode_batch(self.input.config.level, self.plan, &encoders, &idle, batch?)?;
-                file.append(&self.renumbered(encoded))?;
+            *scheme = Some(Scheme::clone(&job.codec.scheme));
+            bytes += window_record(&job).stored_len().map_err(bug)? as f64;
+            for tier in (0..=job.codec.tiers()).rev() {
+                bytes += self.bytes_of_tier(tier, &reader, window.as_ref(), &job)?;
             }
             progress.advance(1);
         }
-        Ok(file.finish(started, Duration::ZERO, &Findings::default(), Duration::ZERO)?.output_bytes)
+        let coded: usize = windows.iter().map(ExactSizeIterator::len).sum();
+        Ok(FIXED_BYTES + bytes * frames as f64 / coded as f64)
     }
 
-    /// The samples of the coded blocks of all channels, in batches.
-    fn batches<'b>(
-        &'b self,
-        reader: &'b WindowReader<'_>,
-        window: &'b dyn FrameWindow,
-        job: &'b Arc<WindowJob>,
-    ) -> impl Iterator<Item = Result<Batch>> + 'b {
-        let some = self.blocks.len();
-        let id = move |i: usize| BlockId::new(job.index, (i / some) as u16, self.blocks[i % some] as u32);
-        let numbers: Vec<BlockId> = (0..some * self.plan.channels()).map(id).collect();
-        (0..numbers.len()).step_by(self.plan.batch).map(move |first| {
-            let end = numbers.len().min(first + self.plan.batch);
-            let blocks = numbers[first..end].iter().map(|block| reader.gather(window, job, *block));
-            Ok(Batch { window: job.clone(), blocks: blocks.collect::<Result<_>>()?, last: end == numbers.len() })
-        })
-    }
-
-    /// Numbers blocks as if there were no others.
-    fn renumbered(&self, mut batch: EncodedBatch) -> EncodedBatch {
-        for Encoded { block, .. } in &mut batch.blocks {
-            let position = self.blocks.binary_search(&(block.id.block as usize));
-            block.id.block = position.unwrap_or_else(|next| next) as u32;
+    /// The bytes of all blocks of a tier, if the others are like the coded ones.
+    fn bytes_of_tier(
+        &self,
+        tier: u8,
+        reader: &WindowReader<'_>,
+        window: &dyn FrameWindow,
+        job: &Arc<WindowJob>,
+    ) -> Result<f64> {
+        let (ids, encoders, idle) = (self.ids(job.index, tier), Encoders::default(), Pool::default());
+        let (mut bytes, mut voxels) = (0.0, 0);
+        for ids in ids.chunks(self.plan.batch) {
+            let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
+            let batch = Batch { window: job.clone(), blocks, last: false };
+            for Encoded { block, .. } in
+                encode_batch(self.input.config.level, self.plan, &encoders, &idle, batch)?.blocks
+            {
+                bytes += block.stored_len() as f64 + LEAF_SHARE * block.entry_len() as f64;
+                voxels += self.plan.size(block.id).iter().product::<usize>();
+            }
         }
-        batch
+        let all = self.plan.channels() * self.input.archive.grid.whole().voxels();
+        Ok(bytes * all as f64 / voxels as f64)
+    }
+
+    /// The coded blocks of a tier: those that were chosen, or the ones above them.
+    fn ids(&self, window: u32, tier: u8) -> Vec<BlockId> {
+        let start = &self.plan.start;
+        let above = |block: &usize| {
+            let chosen = BlockId::new(window, 0, *block as u32);
+            (0..tier).fold(chosen, |id, _| start.above(id))
+        };
+        let of_channel = self.blocks.iter().map(above).collect::<BTreeSet<_>>();
+        let channels = 0..self.plan.channels() as u16;
+        channels.flat_map(|channel| of_channel.iter().map(move |id| BlockId { channel, ..*id })).collect()
     }
 }
+
+/// Bytes of a file beside its windows.
+const FIXED_BYTES: f64 = 1024.0;
 
 #[cfg(test)]
 mod tests {

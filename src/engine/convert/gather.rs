@@ -1,6 +1,6 @@
 //! The reader stage: reads windows of frames and sends batches of blocks.
 
-use super::choose::{SchemeSelector, SpatialPredictor, most_samples};
+use super::choose::{SchemeSelector, most_samples};
 use super::coarse::CoarseBlocks;
 use super::coded_input::{BRIGHTNESS, CodedInput};
 use super::sampled::{self, Pixel};
@@ -98,8 +98,6 @@ pub(super) struct WindowReader<'a> {
     scheme: Option<Scheme>,
     /// Whether schemes are chosen with less care, for an estimate.
     is_rough: bool,
-    /// Whether only some blocks are coded, for an estimate.
-    is_of_some_blocks: bool,
     /// The number of frames in the file so far.
     frames: u64,
     /// Frames of the file that precede the source's first frame.
@@ -114,8 +112,7 @@ impl<'a> WindowReader<'a> {
             _ => Vec::new(),
         };
         // Without a pyramid, readers of version 1.0 suffice.
-        let plain = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0;
-        let packing = if plain { Packing::Flat } else { Packing::default() };
+        let packing = if config.has_pyramids() { Packing::default() } else { Packing::Flat };
         let features = done.features.unwrap_or(Features {
             packing,
             described: archive.description.is_some(),
@@ -134,15 +131,9 @@ impl<'a> WindowReader<'a> {
             findings: Findings::default(),
             scheme,
             is_rough: false,
-            is_of_some_blocks: false,
             frames: 0,
             before: 0,
         }
-    }
-
-    /// Codes blocks without those above them.
-    pub(super) fn code_some_blocks(&mut self) {
-        self.is_of_some_blocks = true;
     }
 
     /// Chooses schemes from fewer samples, each beginning with the one before; the first with `scheme`.
@@ -251,11 +242,11 @@ impl<'a> WindowReader<'a> {
             most: if self.is_rough { most / ROUGH } else { most },
             edge: self.plan.blocks.edges[0],
             packing: self.features.packing,
-            tiers: if self.features.tiered && !self.is_of_some_blocks { self.plan.tiers() } else { 0 },
+            tiers: if self.features.tiered { self.plan.tiers() } else { 0 },
             before,
         };
         let mut codec = selector.choose()?;
-        self.scheme = Some(codec.scheme.clone());
+        self.scheme = Some(Scheme::clone(&codec.scheme));
         codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
         self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
         let id = self.id(scan.digest)?;
@@ -264,7 +255,7 @@ impl<'a> WindowReader<'a> {
         let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        let coarse = CoarseBlocks::new(self.plan.kept_above);
+        let coarse = CoarseBlocks::new(self.config.memory, self.plan);
         let (features, digest) = (self.features, scan.digest);
         Ok(WindowJob { index, first_frame, id, features, codec, coarse, range, digest, times })
     }
@@ -392,18 +383,24 @@ impl<'a> WindowReader<'a> {
         let end = |places: &[usize]| places.last().map_or(0, |last| last + 1);
         let (mut samples, mut rows) = (self.idle.take().unwrap_or_default(), Vec::new());
         samples.clear();
+        let row = (end(xs) - xs[0]) * each;
+        let together = (ROWS_BYTES / (row << id.tier)).max(1);
         for (frame, z) in (0..window.frames()).flat_map(|frame| zs.iter().map(move |z| (frame, *z))) {
-            let plane = Region { start: [xs[0], ys[0], z], end: [end(xs), end(ys), z + 1] };
-            rows.resize(plane.voxels() * each, 0);
-            window.read_box(frame, &plane, &mut rows)?;
-            for y in ys {
-                let row = &rows[(y - ys[0]) * plane.dims()[0] * each..];
-                xs.iter().for_each(|x| samples.extend_from_slice(&row[(x - xs[0]) * each..][..each]));
+            for ys in ys.chunks(together) {
+                let part = Region { start: [xs[0], ys[0], z], end: [end(xs), end(ys), z + 1] };
+                rows.resize(part.voxels() * each, 0);
+                window.read_box(frame, &part, &mut rows)?;
+                for row in ys.iter().map(|y| &rows[(y - ys[0]) * row..]) {
+                    xs.iter().for_each(|x| samples.extend_from_slice(&row[(x - xs[0]) * each..][..each]));
+                }
             }
         }
         Ok(BlockSamples { id, samples })
     }
 }
+
+/// Bytes of the rows that are read together for blocks of tiers above 0.
+const ROWS_BYTES: usize = 1 << 20;
 
 /// The colour channels of a window; empty if samples are coded directly.
 fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {

@@ -180,6 +180,13 @@ impl ConvertConfig {
     }
 }
 
+impl ConvertConfig {
+    /// Whether windows may have pyramids.
+    fn has_pyramids(&self) -> bool {
+        self.coding.space != SpatialPredictor::Alone && self.tolerance > 0.0
+    }
+}
+
 /// The default of [`ConvertConfig::chain`].
 const CHAIN: usize = 8;
 
@@ -424,7 +431,7 @@ fn encode_block(
     let nodes = plan.coarse_nodes(&codec, id);
     let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
     let (block, field) = coded.map_err(bug)?;
-    window.coarse.add(&codec, &block, field);
+    window.coarse.add(&codec, &block, field)?;
     Ok(Encoded { block, share: 0.0 })
 }
 

@@ -2,6 +2,7 @@
 
 use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
+use crate::file::above::shared_bytes;
 use crate::file::promise::UNIT_RANGE;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::{BlockGrid, Region};
@@ -11,6 +12,7 @@ use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::Bound;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
 use wavesplat_core::wavelet;
+use wavesplat_format::limits::MAX_TIERS;
 use wavesplat_format::{Basis, BlockId, Metadata};
 
 /// Decisions made from the configuration and the archive before any frame is read.
@@ -23,8 +25,8 @@ pub(super) struct Plan<'a> {
     pub(super) blocks: BlockGrid,
     /// Blocks that are gathered, encoded and written together.
     pub(super) batch: usize,
-    /// The number of blocks above others that stay decoded.
-    pub(super) kept_above: usize,
+    /// Bytes of the decoded nodes of a block above others; 0 without tiers.
+    pub(super) bytes_above: usize,
 }
 
 /// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
@@ -39,9 +41,6 @@ fn block_edge(coding: SchemeConstraint, dims: [usize; 3], window: usize) -> usiz
     let longest = dims.into_iter().max().unwrap_or(1);
     if alone { edge } else { longest.min(edge) }
 }
-
-/// Whether files have tiers: not before everything that reads files knows them.
-const WRITES_TIERS: bool = false;
 
 /// The widest blocks of thin volumes.
 const WIDEST: usize = 256;
@@ -84,7 +83,7 @@ impl<'a> Plan<'a> {
         blocks_of_tier(self.blocks, tier)
     }
 
-    /// The least number of tiers for which the last has one block; 0 if blocks cannot be halved, or tiers are not written.
+    /// The least number of tiers for which the last has one block; at most [`MAX_TIERS`]; 0 if blocks cannot be halved.
     pub(super) fn tiers(&self) -> u8 {
         tiers(self.blocks)
     }
@@ -128,20 +127,10 @@ impl<'a> Plan<'a> {
                 format!("{edge} voxels a side give more than 2^32 blocks; take larger ones"),
             ));
         }
-        let kept_above = kept_above(input, blocks);
-        let batch = batch_len(input, blocks, kept_above)?;
+        let bytes_above = bytes_above(input, blocks);
+        let batch = batch_len(input, blocks, bytes_above)?;
         let start = start(input, edge);
-        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, batch, kept_above })
-    }
-
-    /// The plan of a file that has `count` blocks, side by side along the longest axis.
-    pub(super) fn for_blocks(&self, count: usize) -> Self {
-        let mut dims = self.blocks.region(0).dims();
-        if let Some(longest) = dims.iter_mut().max() {
-            *longest *= count;
-        }
-        let start = Metadata { dims: dims.map(|n| n as u64), ..self.start.clone() };
-        Self { start, blocks: BlockGrid { dims, ..self.blocks }, ..*self }
+        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, batch, bytes_above })
     }
 
     pub(super) fn channels(&self) -> usize {
@@ -166,19 +155,16 @@ fn blocks_of_tier(blocks: BlockGrid, tier: u8) -> BlockGrid {
 /// As [`Plan::tiers`].
 fn tiers(blocks: BlockGrid) -> u8 {
     let is_one = |tier: &u8| blocks_of_tier(blocks, *tier).len() == 1;
-    let is_even = WRITES_TIERS && blocks.edges[0].is_multiple_of(2);
-    (0..wavesplat_format::limits::MAX_TIERS).find(is_one).filter(|_| is_even).unwrap_or(0)
+    let is_even = blocks.edges[0].is_multiple_of(2);
+    let tiers = (0..MAX_TIERS).find(is_one).unwrap_or(MAX_TIERS);
+    if is_even { tiers } else { 0 }
 }
 
 /// Bytes of the decoded nodes of a block above others.
 fn bytes_above(input: &CodedInput, blocks: BlockGrid) -> usize {
     let nodes: usize = blocks.region(0).dims().iter().map(|n| n + 1).product();
-    if tiers(blocks) == 0 { 0 } else { nodes * most_coefficients(&input.config) * size_of::<f64>() }
-}
-
-/// The number of blocks above others that stay decoded: as many as fit in an eighth of the memory, at least one.
-fn kept_above(input: &CodedInput, blocks: BlockGrid) -> usize {
-    (input.config.memory / 8).checked_div(bytes_above(input, blocks)).map_or(0, |count| count.max(1))
+    let has_tiers = input.config.has_pyramids() && tiers(blocks) > 0;
+    if has_tiers { nodes * most_coefficients(&input.config) * size_of::<f64>() } else { 0 }
 }
 
 /// Checks that the tolerance or error is valid for this bound and these samples.
@@ -231,7 +217,7 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
 
 /// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
 /// workers' scratch, and what choosing the next window's scheme takes.
-fn batch_len(input: &CodedInput, blocks: BlockGrid, kept_above: usize) -> Result<usize> {
+fn batch_len(input: &CodedInput, blocks: BlockGrid, above: usize) -> Result<usize> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
@@ -240,23 +226,27 @@ fn batch_len(input: &CodedInput, blocks: BlockGrid, kept_above: usize) -> Result
     let raw = samples * colour_transform.as_ref().map_or(sample.size(), largest);
     let channel_bytes = colour_transform.as_ref().map_or(0, |_| samples * sample.size());
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
-    let alone = config.coding.space == SpatialPredictor::Alone || config.tolerance == 0.0; // no pyramid is tried then
-    let field = if alone { 0 } else { 2 * voxels * most_coefficients(config) * size_of::<f64>() };
-    let choice = if alone { 0 } else { choose::bytes(samples, sample) };
-    let above = bytes_above(input, blocks); // beside those that stay decoded
-    let scratch = samples + 2 * codes + field + raw + channel_bytes + above + ZSTD_SCRATCH;
-    let needs = |batch: &usize| {
-        batch * 4 * raw
-            + batch.min(&rayon::current_num_threads()) * scratch
-            + choice
-            + kept_above * above
-            + memory::FIXED
+    let has_pyramids = config.has_pyramids();
+    let field = if has_pyramids { 2 * voxels * most_coefficients(config) * size_of::<f64>() } else { 0 };
+    let choice = if has_pyramids { choose::bytes(samples, sample) } else { 0 };
+    let threads = |batch: usize| batch.min(rayon::current_num_threads());
+    let begin = above / 4; // the nodes that lie in a block, of which each has one part in eight, and more at faces
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + ZSTD_SCRATCH;
+    let shared = |batch: usize, memory: usize| {
+        let in_work = threads(batch) * above;
+        let spool = 2 * SPOOLED; // vectors grow to twice their length
+        if above > 0 { spool + shared_bytes(memory, above).max(in_work) } else { 0 }
     };
-    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS); // recent memory is cached
-    let fits = (1..=enough).rev().find(|batch| needs(batch) + archive.memory <= config.memory);
+    let needs = |batch: usize| batch * 4 * raw + threads(batch) * scratch + choice + memory::FIXED;
+    // recent memory is cached
+    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS);
+    let all = |batch: usize, memory: usize| needs(batch) + shared(batch, memory);
+    let fits = (1..=enough).rev().find(|batch| all(*batch, config.memory) + archive.memory <= config.memory);
     fits.ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
-        let (least, edge) = ((needs(&1) as f64 * share / MIB).ceil(), blocks.edges[0]);
+        let scaled = |needs: usize| needs as f64 * share;
+        let (least, edge) = (memory::least(|memory| scaled(all(1, memory)) as usize), blocks.edges[0]);
+        let least = least.div_ceil(MIB);
         let window = config.window;
         let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
         Error::setting(
@@ -275,9 +265,12 @@ fn most_coefficients(config: &ConvertConfig) -> usize {
     }
 }
 
+/// Bytes of coded blocks above others that stay in memory; more go to a temporary file.
+pub(super) const SPOOLED: usize = 1 << 18;
+
 /// An upper bound of the memory of a zstd context at the offered levels, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
-const MIB: f64 = 1_048_576.0;
+const MIB: usize = 1 << 20;
 
 #[cfg(test)]
 mod tests {

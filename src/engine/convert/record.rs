@@ -166,7 +166,7 @@ impl<'a, W: Write> WindowWriter<'a, W> {
 }
 
 /// The record that begins a window.
-fn window_record(job: &WindowJob) -> WindowRecord {
+pub(super) fn window_record(job: &WindowJob) -> WindowRecord {
     let (scheme, WindowEnd { number, reached, share, squared_error, min, max, missing, coded, outliers }) =
         (&job.codec.scheme, WindowEnd::empty(job.index));
     let window = Window {

@@ -1,19 +1,28 @@
 //! The blocks above others, decoded: many blocks share what is coarse.
 
+use super::detail;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::memory::FIXED;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::field::{Above, Field};
-use wavesplat_format::{BlockId, Metadata};
+use wavesplat_format::{BlockEntry, BlockId, Metadata, Window};
 
 /// The decoded blocks above that were used last, for all threads.
 #[derive(Debug)]
 pub(crate) struct AboveBlocks {
     /// The largest number of blocks that stay decoded.
-    most: usize,
+    most: AtomicUsize,
     /// The most recently used comes last.
     kept: Mutex<Vec<(AboveKey, Slot)>>,
+    /// The leaves of the directory that were read last, by their first blocks.
+    leaves: Mutex<VecDeque<(BlockId, Arc<Vec<BlockEntry>>)>>,
 }
+
+/// Leaves that stay in memory: those of a block in every tier.
+const LEAVES: usize = 8;
 
 /// What is decoded of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,22 +36,36 @@ pub(crate) struct AboveKey {
 /// Empty until one thread has decoded it; others wait.
 type Slot = Arc<Mutex<Option<Arc<Field<'static>>>>>;
 
-/// The blocks of an open file that stay decoded for each thread.
-const FOR_A_THREAD: usize = 2;
-
-impl Default for AboveBlocks {
-    fn default() -> Self {
-        Self::new(FOR_A_THREAD * rayon::current_num_threads())
-    }
-}
+/// Decoded blocks above others take one part in so many of a memory budget.
+const SHARE: usize = 8;
 
 impl AboveBlocks {
-    /// The largest number of blocks above others that are decoded at a time, for each thread.
-    pub(crate) const HELD_BY_A_THREAD: usize = FOR_A_THREAD + 1;
+    /// Room for the blocks of `bytes` bytes each that fit in their share of a memory budget; at least one.
+    pub(crate) fn within(memory: usize, bytes: usize) -> Self {
+        Self { most: AtomicUsize::new(blocks_within(memory, bytes)), kept: Mutex::default(), leaves: Mutex::default() }
+    }
 
-    /// Room for so many blocks, at least one.
-    pub(crate) fn new(most: usize) -> Self {
-        Self { most: most.max(1), kept: Mutex::default() }
+    /// Changes the memory budget of which they take a share.
+    pub(super) fn limit(&self, memory: usize, bytes: usize) {
+        self.most.store(blocks_within(memory, bytes), Relaxed);
+    }
+
+    /// The entries of a leaf.
+    pub(crate) fn leaf(
+        &self,
+        first: BlockId,
+        read: impl FnOnce() -> Result<Vec<BlockEntry>>,
+    ) -> Result<Arc<Vec<BlockEntry>>> {
+        let leaves = || self.leaves.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, entries)) = leaves().iter().find(|(of, _)| *of == first) {
+            return Ok(entries.clone());
+        }
+        let entries = Arc::new(read()?);
+        let mut leaves = leaves();
+        leaves.push_back((first, entries.clone()));
+        let old = leaves.len().saturating_sub(LEAVES);
+        leaves.drain(..old);
+        Ok(entries)
     }
 
     /// A decoded block.
@@ -66,32 +89,70 @@ impl AboveBlocks {
         let used = found.unwrap_or_else(|| (key, Slot::default()));
         let slot = used.1.clone();
         kept.push(used);
-        let old = kept.len().saturating_sub(self.most);
+        let old = kept.len().saturating_sub(self.most.load(Relaxed));
         kept.drain(..old);
         slot
     }
 }
 
-/// Where the nodes lie that a block begins with: the block of a tier above, the first of these nodes on its lattice at a level of
-/// detail, and the number of nodes of that lattice.
+/// The number of blocks of `bytes` bytes each in their share of a memory budget.
+fn blocks_within(memory: usize, bytes: usize) -> usize {
+    let room = memory.saturating_sub(FIXED) / SHARE;
+    (room / bytes.max(1)).clamp(1, MOST)
+}
+
+/// Bytes of the blocks of `bytes` bytes each in their share of a memory budget.
+pub(crate) fn shared_bytes(memory: usize, bytes: usize) -> usize {
+    blocks_within(memory, bytes) * bytes
+}
+
+/// More blocks would take longer to search than they save.
+const MOST: usize = 1024;
+
+/// Where the nodes lie that a block begins with.
 pub(crate) struct PlaceAbove {
+    /// The block above.
     pub(crate) id: BlockId,
+    /// Its nodes along x, y, z.
+    outer: [usize; 3],
+    /// The first of them in the block.
     start: [usize; 3],
+    /// Those in the block.
     size: [usize; 3],
 }
 
 impl PlaceAbove {
-    pub(crate) fn new(file: &Metadata, codec: &WindowCodec, id: BlockId, tier: u8, lod: u32) -> Self {
-        let mut above = id;
-        while above.tier < tier {
-            above = file.above(above);
+    /// The place of a block of a file; `above` is the codec of blocks above.
+    pub(crate) fn new(file: &Metadata, codec: &WindowCodec, above: &WindowCodec, id: BlockId) -> Self {
+        let mut id_above = id;
+        while id_above.tier < above.tier {
+            id_above = file.above(id_above);
         }
-        let [own, outer] = [id, above].map(|id| file.block_box(id.tier, id.block).unwrap_or_default());
-        let start = std::array::from_fn(|a| ((own.0[a] - outer.0[a]) >> (u32::from(tier) + lod)) as usize);
-        Self { id: above, start, size: codec.at(tier, lod).decoded_size(outer.1.map(|n| n as usize)) }
+        let [own, outer] = [id, id_above].map(|id| file.block_box(id.tier, id.block).unwrap_or_default());
+        let apart = u32::from(above.tier) + above.lod;
+        let start = std::array::from_fn(|a| ((own.0[a] - outer.0[a]) >> apart) as usize);
+        let [size, outer] = [own.1, outer.1].map(|size| size.map(|n| n as usize));
+        Self { id: id_above, outer: above.decoded_size(outer), start, size: codec.known_size(above, size) }
     }
 
-    pub(crate) fn with(self, field: Arc<Field<'static>>) -> Above {
-        Above { field, size: self.size, start: self.start }
+    /// Copies the block's nodes out of the decoded block above.
+    pub(crate) fn cut(&self, field: &Field<'_>) -> Above {
+        Above::new(field, self.outer, self.start, self.size)
     }
+}
+
+/// Bytes of the decoded nodes of a block above others; 0 without tiers.
+pub(super) fn bytes_above(m: &Metadata) -> usize {
+    let bytes = |window: &Window| {
+        let is_single = window.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
+        window.coefficients as usize * if is_single { size_of::<f32>() } else { size_of::<f64>() }
+    };
+    let tiered = m.windows.iter().filter(|window| window.tiers() > 0);
+    nodes_above(m) * tiered.map(bytes).max().unwrap_or(0)
+}
+
+/// The most nodes of a block above others, ghost nodes included.
+pub(super) fn nodes_above(m: &Metadata) -> usize {
+    let (_, blocks) = detail::whole(m);
+    blocks.region(0).dims().iter().map(|n| n + 1).product()
 }

@@ -1,10 +1,12 @@
 //! Checks of the bytes of a file: checksums, headers and padding, without decoding.
 
 use super::CoefficientFile;
-use super::coefficient_file::BLOCKS_TOGETHER;
 use rayon::prelude::*;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_format::{BlockEntry, CompletePrefix, LeafEntry};
+
+/// Blocks that are fetched together to be checked.
+pub(super) const BLOCKS_TOGETHER: usize = 32;
 
 impl CoefficientFile {
     /// Checks every byte of the file outside blocks and leaves. Calls `found` for each problem.

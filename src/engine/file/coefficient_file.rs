@@ -1,21 +1,21 @@
 //! An open coefficient file: the format's reader over any storage, in this library's terms.
 
-use crate::file::above::AboveBlocks;
+use crate::file::above::{AboveBlocks, bytes_above};
 use crate::file::counted::Counted;
+use crate::file::damage::Damage;
 use crate::file::decoded::DecodedBlocks;
 use crate::file::detail;
 use crate::file::promise::{self, setting};
 use crate::remote::{self, RemoteOptions};
-use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use wavesplat_core::base::address::{is_address, public_name};
 use wavesplat_core::base::description::Description;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
 use wavesplat_core::base::mapped::{Access, FileBytes, State};
+use wavesplat_core::base::memory;
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::base::time_labels::TimeLabels;
 use wavesplat_core::codec::WindowCodec;
@@ -23,9 +23,6 @@ use wavesplat_core::codec::coarse;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
 use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage};
-
-/// Blocks that are fetched together to be checked.
-pub(super) const BLOCKS_TOGETHER: usize = 32;
 
 /// An open coefficient file; several threads may read it. Clones share what is open.
 #[derive(Debug, Clone)]
@@ -45,34 +42,11 @@ pub struct CoefficientFile {
     /// What made samples into channels, if there are several.
     colour_transform: Option<ColourTransform>,
     /// Damaged blocks that are taken for missing samples, if they are.
-    skipped: Option<Arc<Damage>>,
+    pub(super) skipped: Option<Arc<Damage>>,
     /// Decoded blocks that are kept, if there is room for some.
     pub(super) kept: Option<Arc<DecodedBlocks>>,
     /// Decoded blocks of tiers above 0.
     pub(super) above: Arc<AboveBlocks>,
-}
-
-/// The damage to a file, block by block.
-#[derive(Debug, Default)]
-struct Damage {
-    blocks: BTreeMap<BlockId, String>,
-    /// The damaged blocks that were asked for.
-    met: Mutex<BTreeSet<BlockId>>,
-}
-
-impl Damage {
-    /// The number of damaged blocks that were asked for, and the problem of the first; `None` if all blocks that were
-    /// asked for are whole.
-    fn words(&self) -> Option<String> {
-        let met = self.met.lock().unwrap_or_else(PoisonError::into_inner);
-        let first = self.blocks.get(met.first()?)?;
-        Some(format!("{} damaged blocks were left out; the first: {first}", met.len()))
-    }
-
-    fn is_in_window(&self, window: u32) -> bool {
-        let first = BlockId::new(window, 0, 0);
-        self.blocks.range(first..).next().is_some_and(|(id, _)| id.window == window)
-    }
 }
 
 impl CoefficientFile {
@@ -125,6 +99,7 @@ impl CoefficientFile {
         let m = reader.metadata();
         let (grid, blocks) = detail::whole(m);
         let colour_transform = colour_transform(m).map_err(failed)?;
+        let above = Arc::new(AboveBlocks::within(memory::DEFAULT, bytes_above(m)));
         Ok(Self {
             path,
             grid,
@@ -136,7 +111,7 @@ impl CoefficientFile {
             state: None,
             skipped: None,
             kept: None,
-            above: Arc::default(),
+            above,
         })
     }
 
@@ -182,6 +157,12 @@ impl CoefficientFile {
     /// Its identity.
     pub fn id(&self) -> FileId {
         self.reader.id()
+    }
+
+    /// The version of the format that a reader needs, such as 1.2.
+    pub fn format_version(&self) -> String {
+        let (major, minor) = self.reader.features().version();
+        format!("{major}.{minor}")
     }
 
     /// Its length in bytes.
@@ -255,8 +236,8 @@ impl CoefficientFile {
     /// and exactly stored samples.
     pub fn block_bytes(&self) -> usize {
         let payload = 5;
-        let own = self.largest_block() * (payload + size_of::<i32>() + size_of::<f64>() + 1 + self.sample().size());
-        own + self.bytes_above()
+        let refined = payload + size_of::<i32>() + size_of::<f64>();
+        self.largest_block() * (refined + 1 + self.sample().size()) + self.bytes_to_begin(refined)
     }
 
     /// The window that holds a frame; the last one for frames past the end.
@@ -293,81 +274,11 @@ impl CoefficientFile {
         self.reader.leaves_of(window, 0, channel as u16)
     }
 
-    /// Reads every block, then treats damaged ones as missing samples.
-    ///
-    /// # Errors
-    /// The storage cannot be read.
-    pub fn skip_damaged(mut self) -> Result<Self> {
-        let leaves = (0..self.metadata().windows.len() as u32).flat_map(|window| self.leaves(window));
-        let leaves: Vec<_> = leaves.copied().collect();
-        let found = match self.is_remote() {
-            true => leaves.iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?, // threads would push out each other's pages
-            false => leaves.par_iter().map(|leaf| self.damage(leaf)).collect::<Result<Vec<_>>>()?,
-        };
-        let blocks = self.with_blocks_below(found.into_iter().flatten().collect());
-        let damage = Damage { blocks, met: Mutex::default() };
-        self.skipped = Some(damage.into());
-        self.kept = self.kept.map(|kept| Arc::new(kept.emptied())); // damaged blocks must not be found without skipping
-        Ok(self)
-    }
-
-    /// Damaged blocks, and those that begin with the nodes of one of them.
-    fn with_blocks_below(&self, mut damaged: BTreeMap<BlockId, String>) -> BTreeMap<BlockId, String> {
-        let above: Vec<u32> = damaged.keys().filter(|id| id.tier > 0).map(|id| id.window).collect();
-        for leaf in above.iter().flat_map(|window| self.leaves(*window)) {
-            for id in leaf.ids() {
-                let wrong = damaged.get(&self.metadata().above(id)).cloned();
-                wrong.into_iter().for_each(|wrong| _ = damaged.entry(id).or_insert(wrong));
-            }
-        }
-        damaged
-    }
-
-    /// The damage to the blocks of a leaf; an error if the storage fails.
-    fn damage(&self, leaf: &LeafEntry) -> Result<Vec<(BlockId, String)>> {
-        let entries = match self.reader.leaf(leaf) {
-            Err(failed) if failed.is_io() => return Err(self.failed(failed)),
-            Err(wrong) => return Ok(leaf.ids().map(|id| (id, wrong.to_string())).collect()),
-            Ok(entries) => entries,
-        };
-        let mut found = Vec::new();
-        for entries in entries.chunks(BLOCKS_TOGETHER) {
-            self.fetch_whole(entries)?;
-            for entry in entries {
-                match self.reader.check_stored(entry) {
-                    Ok(()) => {}
-                    Err(failed) if failed.is_io() => return Err(self.failed(failed)),
-                    Err(wrong) => found.push((entry.id, wrong.to_string())),
-                }
-            }
-        }
-        Ok(found)
-    }
-
-    /// What [`Self::skip_damaged`] found.
-    fn skipped(&self) -> Option<&Damage> {
-        self.skipped.as_deref().filter(|damage| !damage.blocks.is_empty())
-    }
-
-    /// An error that names the damaged blocks that were skipped, if any were. Call it last.
-    ///
-    /// # Errors
-    /// Blocks were skipped.
-    pub fn refuse_skipped(&self) -> Result<()> {
-        self.skipped().and_then(Damage::words).map_or(Ok(()), |what| Err(Error::input(&self.path, what)))
-    }
-
-    /// Whether any sample of a window may be missing.
-    pub fn has_missing(&self, window: u32) -> bool {
-        let record = &self.metadata().windows[window as usize];
-        record.missing > 0 || self.skipped().is_some_and(|damage| damage.is_in_window(window))
-    }
-
     /// The entries of a leaf's blocks.
     #[doc(hidden)]
     pub fn leaf(&self, leaf: &LeafEntry) -> Result<Vec<BlockEntry>> {
         let Some(skipped) = self.skipped() else { return self.reader.leaf(leaf).map_err(|e| self.failed(e)) };
-        let is_lost = |id: &BlockId| skipped.blocks.contains_key(id);
+        let is_lost = |id: &BlockId| skipped.has(*id);
         if leaf.ids().all(|id| is_lost(&id)) {
             return Ok(leaf.ids().map(BlockEntry::lost).collect());
         }
@@ -412,7 +323,7 @@ impl CoefficientFile {
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
         let size = self.all_voxels(entry)?;
         if let Some(skipped) = self.skipped.as_ref().filter(|_| entry.lost) {
-            skipped.met.lock().unwrap_or_else(PoisonError::into_inner).insert(entry.id);
+            skipped.meet(entry.id);
             return Ok(Block::missing(codec, size));
         }
         let (above, bytes_above) = match entry.begins_above(codec.tiers()) {

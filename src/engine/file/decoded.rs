@@ -31,8 +31,8 @@ pub(super) struct DecodedKey {
 /// The form in which a block is decoded.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum DecodedForm {
-    /// The coefficients that are marked, of some parts.
-    Coefficients { wanted: Vec<bool>, parts: Vec<PartKind> },
+    /// The coefficients that are marked, of some parts and, if so, of the nodes above.
+    Coefficients { wanted: Vec<bool>, parts: Vec<PartKind>, begins_above: bool },
     /// All samples of the window.
     Samples,
 }

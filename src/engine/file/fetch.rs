@@ -2,13 +2,15 @@
 //! requests.
 
 use super::CoefficientFile;
+use super::tiers::wanted_above;
 use crate::remote::{FETCHED, PageCount};
+use std::collections::HashSet;
 use std::ops::Range;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
-use wavesplat_format::{BlockEntry, LeafEntry, PartEntry, Storage};
+use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartEntry, Storage};
 
 /// Windows that are fetched together at most.
 const WINDOWS_TOGETHER: usize = 256;
@@ -18,13 +20,19 @@ const WINDOWS_TOGETHER: usize = 256;
 pub struct Prefetch<'a> {
     file: &'a CoefficientFile,
     parts: Vec<PartEntry>,
+    /// The blocks above others whose parts were added.
+    above: HashSet<BlockId>,
     pages: PageCount,
 }
+
+/// What is coarse in a window is fetched together with its directory if it has at most so many bytes: about what a server sends
+/// in the time of one more request.
+const FEW_BYTES: u64 = 128 << 10;
 
 impl<'a> Prefetch<'a> {
     /// `None` for a local file, which needs none.
     pub fn new(file: &'a CoefficientFile) -> Option<Self> {
-        file.is_remote().then(|| Self { file, parts: Vec::new(), pages: PageCount::default() })
+        file.is_remote().then(|| Self { file, parts: Vec::new(), above: HashSet::new(), pages: PageCount::default() })
     }
 
     /// Fetches the leaves of a channel that list blocks of a region, of the first windows. Each window is given by some of
@@ -57,11 +65,17 @@ impl<'a> Prefetch<'a> {
         Ok(count)
     }
 
-    /// Adds the parts of a block that the coefficients marked by `wanted` need.
-    pub fn add(&mut self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) {
+    /// Adds the parts of a block that the coefficients marked by `wanted` need, and those of the blocks above it.
+    pub fn add(&mut self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<()> {
         for part in Block::parts(codec, entry, wanted) {
             self.pages.add(&bytes_of(part));
             self.parts.push(*part);
+        }
+        let Some(above) = codec.above().filter(|codec| entry.begins_above(codec.tiers())) else { return Ok(()) };
+        let id = self.file.id_above(entry.id, above.tier);
+        match self.above.insert(id) {
+            true => self.add(&above, &self.file.entry_above(id)?, &wanted_above(codec, wanted)),
+            false => Ok(()),
         }
     }
 
@@ -100,14 +114,19 @@ impl CoefficientFile {
         self.reader.storage().fetch(&ranges).map_err(|e| self.failed(e.into()))
     }
 
-    /// Fetches the leaves of a channel of some windows that list blocks of a region.
+    /// Fetches the leaves of a channel of some windows that list blocks of a region, and those above them.
     pub(super) fn fetch_leaves_of(
         &self,
         windows: impl Iterator<Item = u32>,
         channel: usize,
         region: &Region,
     ) -> Result<()> {
-        self.fetch(windows.flat_map(|window| self.reached(window, channel, region)).map(LeafEntry::bytes))
+        let ranges = |window| {
+            let above = self.leaves_above(window, channel, region).map(LeafEntry::bytes);
+            let coarse = self.coarse_bytes(window).filter(|bytes| bytes.end - bytes.start <= FEW_BYTES);
+            coarse.into_iter().chain(above).chain(self.reached(window, channel, region).map(LeafEntry::bytes))
+        };
+        self.fetch(windows.flat_map(ranges))
     }
 
     /// Fetches the bytes of a remote file from `offset` on, as many as it keeps; returns where they end.
@@ -117,6 +136,33 @@ impl CoefficientFile {
         Ok(end)
     }
 
+    /// Where the blocks of tiers above 0 and their leaves lie.
+    fn coarse_bytes(&self, window: u32) -> Option<Range<u64>> {
+        let mut leaves = self.leaves(window).iter().take_while(|leaf| leaf.tier > 0);
+        let first = leaves.next()?;
+        Some(first.data_offset..leaves.last().unwrap_or(first).bytes().end)
+    }
+
+    /// The leaves that list the blocks above those of a region.
+    fn leaves_above<'a>(
+        &'a self,
+        window: u32,
+        channel: usize,
+        region: &Region,
+    ) -> impl Iterator<Item = &'a LeafEntry> + use<'a> {
+        let last = Region { start: region.end.map(|end| end.saturating_sub(1)), end: region.end };
+        let ends = [region, &last].map(|region| self.blocks.touching(region).next().unwrap_or(0));
+        let of_tier = move |tier: u8| {
+            let [first, last] = ends.map(|block| {
+                let id = BlockId::new(window, channel as u16, block as u32);
+                self.id_above(id, tier).block
+            });
+            let leaves = self.reader.leaves_of(window, tier, channel as u16).iter();
+            leaves.filter(move |leaf| leaf.first_block <= last && first < leaf.first_block + u32::from(leaf.count))
+        };
+        (1..=self.metadata().tiers(window)).rev().flat_map(of_tier)
+    }
+
     /// Fetches parts that will be read soon.
     fn fetch_parts<'a>(&self, parts: impl Iterator<Item = &'a PartEntry>) -> Result<()> {
         self.fetch(parts.map(bytes_of))
@@ -124,7 +170,9 @@ impl CoefficientFile {
 
     /// Fetches the parts of some blocks that the coefficients marked by `wanted` need.
     pub fn fetch_blocks(&self, codec: &WindowCodec, entries: &[BlockEntry], wanted: &[bool]) -> Result<()> {
-        self.fetch_parts(entries.iter().flat_map(|entry| Block::parts(codec, entry, wanted)))
+        let Some(mut prefetch) = Prefetch::new(self) else { return Ok(()) };
+        entries.iter().try_for_each(|entry| prefetch.add(codec, entry, wanted))?;
+        prefetch.finish()
     }
 
     /// Fetches all of some blocks.

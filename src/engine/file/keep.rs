@@ -43,7 +43,8 @@ impl CoefficientFile {
         };
         let Some(kept) = self.kept.as_ref().filter(|_| is_field_needed) else { return decode() };
         let parts = entry.parts.iter().map(|part| part.kind).collect();
-        let key = self.key(entry, DecodedForm::Coefficients { wanted: wanted.to_vec(), parts });
+        let (wanted_ks, begins_above) = (wanted.to_vec(), entry.begins_above(codec.tiers()));
+        let key = self.key(entry, DecodedForm::Coefficients { wanted: wanted_ks, parts, begins_above });
         if let Some(block) = kept.block(&key) {
             return Ok(block);
         }

@@ -8,6 +8,7 @@ pub use to_file::Merged;
 use super::CoefficientFile;
 use super::shard::{SHARD, ShardRange, without_shard};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -397,10 +398,10 @@ impl<W: Write> Merger<'_, W> {
         let mut record = WindowRecord { number, ..file.metadata().window_record(window) };
         record.window.first_frame += frames;
         self.written(|writer| writer.begin_window(record))?;
-        let mut sums = WindowEnd::empty(number);
+        let (mut sums, mut lost) = (WindowEnd::empty(number), BTreeSet::new());
         for leaf in file.leaves(window) {
             for entry in self.entries(file, leaf)? {
-                self.add_block(file, &entry, number, &mut sums)?;
+                self.add_block(file, &entry, number, &mut lost, &mut sums)?;
             }
         }
         let WindowEnd { coded, outliers, .. } = sums; // fewer than in the shard if blocks are lost
@@ -419,15 +420,19 @@ impl<W: Write> Merger<'_, W> {
         }
     }
 
+    /// Copies a block. Adds it to the `lost` blocks above others if it is one.
     fn add_block(
         &mut self,
         file: &CoefficientFile,
         entry: &BlockEntry,
         window: u32,
+        lost: &mut BTreeSet<BlockId>,
         sums: &mut WindowEnd,
     ) -> Result<()> {
-        let id = BlockId { window, ..entry.id };
-        let stored = if entry.lost { None } else { self.stored(file, entry)? };
+        let (id, metadata) = (BlockId { window, ..entry.id }, file.metadata());
+        let begins_lost =
+            entry.begins_above(metadata.tiers(entry.id.window)) && lost.contains(&metadata.above(entry.id));
+        let stored = if entry.lost || begins_lost { None } else { self.stored(file, entry)? };
         self.report.blocks += 1;
         match stored {
             Some(block) => {
@@ -436,6 +441,9 @@ impl<W: Write> Merger<'_, W> {
                 self.written(|writer| writer.append(&block))
             }
             None => {
+                if entry.id.tier > 0 {
+                    lost.insert(entry.id);
+                }
                 self.report.blocks_lost += 1;
                 self.written(|writer| writer.append_lost(id))
             }

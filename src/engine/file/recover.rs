@@ -39,6 +39,9 @@ pub struct Run {
     pub window: u32,
     /// Its frames.
     pub frames: (u64, u64),
+    /// Their tier, if it is not that of all voxels.
+    #[serde(skip_serializing_if = "is_finest")]
+    pub tier: u8,
     /// The first of the blocks.
     pub first: u32,
     /// The last.
@@ -46,6 +49,10 @@ pub struct Run {
     /// Their channel, if the file is of colours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<&'static str>,
+}
+
+fn is_finest(tier: &u8) -> bool {
+    *tier == 0
 }
 
 /// Writes all intact blocks of `damaged` to `out`, called `name` in messages. The first progress counts the bytes
@@ -75,9 +82,10 @@ pub fn recover(
     let run = |run: &[BlockId]| {
         let (first, last) = (run[0], run[run.len() - 1]);
         let channel = coloured.then(|| CHANNELS.get(usize::from(first.channel)).copied()).flatten();
-        Run { window: first.window, frames: frames(first.window), first: first.block, last: last.block, channel }
+        let (window, tier) = (first.window, first.tier);
+        Run { window, frames: frames(window), tier, first: first.block, last: last.block, channel }
     };
-    let follows = |a: &BlockId, b: &BlockId| a.window == b.window && a.channel == b.channel && a.block + 1 == b.block;
+    let follows = |a: &BlockId, b: &BlockId| BlockId { block: a.block + 1, ..*a } == *b;
     Ok(RecoverReport {
         frames: metadata.frames,
         windows: metadata.windows.len(),

@@ -45,7 +45,7 @@ pub fn repack(
     let features = Features { described: description.is_some(), ..metadata.features() };
     let id = metadata.file_id(first_digest, features).map_err(failed)?;
     let mut writer = Writer::with_features(out, id, &metadata, features).map_err(failed)?;
-    let at_once = blocks_within(memory, 0, file.block_bytes(), "rewriting")?;
+    let at_once = blocks_within(memory, 0, |_| 0, file.block_bytes(), "rewriting")?;
     progress.start(Some(metadata.blocks()));
     for number in 0..metadata.windows.len() as u32 {
         let to = WindowCodec::from_metadata(&metadata, &metadata.windows[number as usize]).map_err(failed)?;

@@ -4,6 +4,7 @@ use crate::file::CoefficientFile;
 use crate::file::budget::blocks_within;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::progress::Progress;
@@ -13,7 +14,7 @@ use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::{WindowCodec, lane_groups, load_lanes};
 use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Lane;
-use wavesplat_format::{BlockEntry, PartKind};
+use wavesplat_format::{BlockEntry, BlockId, PartKind};
 
 /// The result of checking a file, with its source if one is given.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -24,7 +25,7 @@ pub struct VerifyReport {
     pub bytes: u64,
     /// Places where it is damaged, and blocks that were lost before it was recovered.
     pub damaged: u64,
-    /// Blocks that could not be checked, since what lists them is damaged.
+    /// Blocks that could not be checked, or not decoded, since what lists them or a block above is damaged.
     pub unchecked: u64,
     /// Descriptions of the first damage, at most [`MOST_NAMED`].
     pub damage: Vec<String>,
@@ -150,7 +151,9 @@ pub fn verify(
         same_shape(file, *source)?;
     }
     let held = source.as_ref().map_or(0, |source| source.archive().memory);
-    let at_once = blocks_within(memory, held, bytes_of_block(file, source.is_some()), "verifying")?;
+    file.limit_shared(memory);
+    let block = bytes_of_block(file, source.is_some());
+    let at_once = blocks_within(memory, held, |memory| file.shared_bytes(memory), block, "verifying")?;
     let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
     file.check_structure(&mut |wrong| report.damage(&wrong))?;
     let (mut all, mut fetched) = (Comparison::default(), 0);
@@ -162,24 +165,37 @@ pub fn verify(
             let what = format!("ends after {} frames, {} were converted", range.start + frames.frames(), file.frames());
             return Err(Error::input(frames.name(0), what));
         }
+        let mut damaged = BTreeSet::new();
         for leaf in file.leaves(window) {
             if leaf.data_offset >= fetched {
                 fetched = file.fetch_on(leaf.data_offset)?;
             }
             let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
             let entries = report.whole(file.leaf(leaf))?;
-            report.unchecked += if entries.is_none() { u64::from(leaf.count) } else { 0 };
+            if entries.is_none() {
+                report.unchecked += u64::from(leaf.count);
+                damaged.extend(leaf.ids().filter(|id| id.tier > 0));
+            }
             let entries = entries.unwrap_or_default();
             let mut at = leaf.data_offset;
             for entries in entries.chunks(at_once) {
                 file.fetch_whole(entries)?;
                 at = file.check_blocks(at, entries, &mut |wrong| report.damage(&wrong))?;
-                for found in entries.par_iter().map(check).collect::<Vec<_>>() {
-                    all = report.whole(found)?.map_or(all, |found| all.join(found));
+                let (whole, below): (Vec<_>, Vec<_>) =
+                    entries.iter().partition(|entry| !begins_with_one_of(&damaged, file, entry));
+                report.blocks += whole.len() as u64;
+                for entry in below {
+                    report.unchecked +=
+                        u64::from(report.whole(file.reader.check_stored(entry).map_err(|e| file.failed(e)))?.is_some());
+                    damaged.extend(Some(entry.id).filter(|id| id.tier > 0));
+                }
+                for (entry, found) in whole.par_iter().map(|entry| (entry.id, check(entry))).collect::<Vec<_>>() {
+                    let found = report.whole(found)?;
+                    damaged.extend(Some(entry).filter(|id| id.tier > 0 && found.is_none()));
+                    all = found.map_or(all, |found| all.join(found));
                 }
             }
             file.check_leaf_end(leaf, &mut |wrong| report.damage(&wrong))?;
-            report.blocks += entries.len() as u64;
             progress.advance(leaf.count.into());
         }
         frames.map_or(Ok(()), |frames| frames.check_unchanged())?;
@@ -191,6 +207,12 @@ pub fn verify(
         report.against = Some(all);
     }
     Ok(report)
+}
+
+/// Whether a block begins with the nodes of one of some damaged blocks.
+fn begins_with_one_of(damaged: &BTreeSet<BlockId>, file: &CoefficientFile, entry: &BlockEntry) -> bool {
+    let metadata = file.metadata();
+    entry.begins_above(metadata.tiers(entry.id.window)) && damaged.contains(&metadata.above(entry.id))
 }
 
 /// Bytes to check a block, and to compare it: the samples of the source, also before they became colours, and the

@@ -26,7 +26,7 @@ fn add(
 ) -> Result<()> {
     let InWindow { window, codec, wanted, .. } = InWindow::new(file, frames)?;
     for entries in file.entries(window, channel, &piece.region) {
-        entries?.iter().for_each(|entry| prefetch.add(&codec, entry, &wanted));
+        entries?.iter().try_for_each(|entry| prefetch.add(&codec, entry, &wanted))?;
     }
     Ok(())
 }

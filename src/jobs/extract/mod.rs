@@ -158,11 +158,13 @@ impl Pieces {
         let length = |axis| length(axis, config.frames.len(), &config.region);
         let [_, second, third, fastest] = config.order.axes().map(length);
         let plane = third.saturating_mul(fastest).saturating_mul(file.sample().size());
-        let available = config.memory.saturating_sub(memory::FIXED + block_bytes(file)) / 2;
+        let fixed = |memory| memory::FIXED + file.shared_bytes(memory) + block_bytes(file);
+        let available = config.memory.saturating_sub(fixed(config.memory)) / 2;
         if available < plane {
-            let least = (2 * plane + memory::FIXED + block_bytes(file)).div_ceil(1 << 20);
+            let least = memory::least(|memory| 2 * plane + fixed(memory)).div_ceil(1 << 20);
             return Err(Error::setting("memory", format!("extracting from this file needs at least {least}MiB")));
         }
+        file.limit_shared(config.memory);
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
         let planes = available / plane.max(1);
         Ok(Self { blocks, items: [(planes / second.max(1)).max(1), planes.min(second.max(1))] })

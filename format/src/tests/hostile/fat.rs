@@ -16,10 +16,10 @@ pub(super) struct Original {
     checked: RefCell<HashSet<u128>>,
 }
 
-/// Has windows of all bases, with and without a pyramid, two channels, times, outliers, missing and exact samples, and a lost
+/// Has windows of all bases, with and without a pyramid and tiers, two channels, times, outliers, missing and exact samples, and a lost
 /// block.
 pub(super) fn fat() -> Original {
-    original([5, 3, 2], 2, 7, Packing::Nested)
+    original([5, 3, 2], 2, 8, Packing::Nested)
 }
 
 /// Like [`fat`], with fewer voxels and one channel.
@@ -28,7 +28,7 @@ pub(super) fn lean() -> Original {
 }
 
 fn original(dims: [u64; 3], channels: u16, seed: u64, packing: Packing) -> Original {
-    let mut metadata = Metadata { dims, channels, block_edge: 3, frames: 13, windows: windows(packing), ..metadata() };
+    let mut metadata = Metadata { dims, channels, block_edge: 4, frames: 13, windows: windows(packing), ..metadata() };
     metadata.times = (0..13).map(|t| f64::from(t) / 2.0).collect();
     let mut blocks = blocks(&mut metadata, seed);
     let lost = blocks[1].0.id;
@@ -68,6 +68,8 @@ fn windows(packing: Packing) -> Vec<Window> {
     all[2].pyramid = pyramid(&[Axis::Z, Axis::Y, Axis::X], Stencil::Linear, true);
     all.push(Window { levels: Vec::new(), ..window(10, 3, Basis::Samples, &[3]) });
     all[3].pyramid = pyramid(&[Axis::X, Axis::Y, Axis::Z, Axis::T], Stencil::Cubic, false);
+    let tiers = u8::from(packing == Packing::Nested);
+    all[3].pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = tiers);
     all
 }
 

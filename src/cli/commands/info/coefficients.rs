@@ -8,7 +8,7 @@ use std::fmt::Write;
 use wavesplat_core::base::description::Description;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::source::CHANNELS;
-use wavesplat_engine::convert::{Bound, Packing};
+use wavesplat_engine::convert::Bound;
 use wavesplat_engine::file::promise::range_of_shares;
 use wavesplat_engine::file::report::{BoundReport, WindowReport, largest_bound};
 use wavesplat_engine::file::{CoefficientFile, time_labels};
@@ -18,7 +18,7 @@ use wavesplat_engine::file::{CoefficientFile, time_labels};
 struct Info {
     id: String,
     /// The version of the format that a reader needs.
-    format: &'static str,
+    format: String,
     bytes: u64,
     dims: [u64; 3],
     spacing: [f64; 3],
@@ -76,9 +76,8 @@ impl Info {
             m.windows.iter().map(|w| WindowReport::new(w, voxels * u64::from(m.channels))).collect();
         let times = time_labels(m);
         let described = file.description()?;
-        let has_features = m.features().packing == Packing::Nested || described.is_some();
         Ok(Self {
-            format: if has_features { "1.1" } else { "1.0" },
+            format: file.format_version(),
             id: file.id().to_string(),
             bytes: file.bytes(),
             dims: m.dims,

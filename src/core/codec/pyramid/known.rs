@@ -14,32 +14,23 @@ pub(crate) struct Nodes<'a, R> {
     pub(crate) size: [usize; 3],
 }
 
-/// The nodes of the block above, and the first of them that lies in the block.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Known<'a, R> {
-    pub(crate) nodes: Nodes<'a, R>,
-    pub(crate) start: [usize; 3],
-}
-
-impl<R: Real> Known<'_, R> {
+impl<R: Real> Nodes<'_, R> {
     /// Whether all nodes of some k are zero.
     pub(super) fn is_zero(&self, ks: Range<usize>) -> bool {
-        let each: usize = self.nodes.size.iter().product();
-        rows::is_zero(self.nodes.values.get(ks.start * each..ks.end * each).unwrap_or_default())
+        let each: usize = self.size.iter().product();
+        rows::is_zero(self.values.get(ks.start * each..ks.end * each).unwrap_or_default())
     }
 
-    /// A row of nodes, from the `x`-th in the block on.
-    fn row(&self, k: usize, [y, z]: [usize; 2]) -> &[R] {
-        let [nx, ny, nz] = self.nodes.size;
-        let [x, of_y, of_z] = self.start;
-        let first = x + nx * (of_y + y + ny * (of_z + z + nz * k));
-        self.nodes.values.get(first..).unwrap_or_default()
+    /// The rest of a row of nodes, from the `x`-th on, and what follows it.
+    fn row(&self, k: usize, [x, y, z]: [usize; 3]) -> &[R] {
+        let [nx, ny, nz] = self.size;
+        self.values.get(x + nx * (y + ny * (z + nz * k))..).unwrap_or_default()
     }
 
-    /// Copies the nodes of some k in a block of `size` nodes.
-    pub(crate) fn copy(&self, [nx, ny, nz]: [usize; 3], ks: Range<usize>, out: &mut [R]) {
-        for (n, to) in out[..nx * ny * nz * ks.len()].chunks_exact_mut(nx).enumerate() {
-            put(self.row(ks.start + n / (ny * nz), [n % ny, n / ny % nz]), 1, to);
+    /// Copies all k of a box of `[nx, ny, nz]` nodes from `start` on.
+    pub(crate) fn copy(&self, [x, y, z]: [usize; 3], [nx, ny, nz]: [usize; 3], out: &mut [R]) {
+        for (n, to) in out.chunks_exact_mut(nx).enumerate() {
+            put(self.row(n / (ny * nz), [x, y + n % ny, z + n / ny % nz]), 1, to);
         }
     }
 }
@@ -47,7 +38,7 @@ impl<R: Real> Known<'_, R> {
 /// The known nodes on the lattices of one pyramid's passes.
 #[derive(Debug)]
 pub(super) struct KnownNodes<'a, R> {
-    known: Known<'a, R>,
+    known: Nodes<'a, R>,
     /// The k of the pyramid's first nodes.
     first: usize,
     passes: Vec<Option<Place>>,
@@ -74,7 +65,7 @@ impl Place {
 }
 
 impl<'a, R: Real> KnownNodes<'a, R> {
-    pub(super) fn new(known: Known<'a, R>, first: usize, passes: &[Pass]) -> Self {
+    pub(super) fn new(known: Nodes<'a, R>, first: usize, passes: &[Pass]) -> Self {
         Self { known, first, passes: passes.iter().map(Place::new).collect() }
     }
 
@@ -93,7 +84,7 @@ impl<'a, R: Real> KnownNodes<'a, R> {
         let k = self.first + frames.0 + slice * frames.1;
         for (z, y) in (0..nz).step_by(of_z).flat_map(|z| (0..ny).step_by(of_y).map(move |y| (z, y))) {
             let at = nx * (y + ny * z);
-            put(self.known.row(k, [y / of_y, z / of_z]), of_x, &mut nodes[at..][..nx]);
+            put(self.known.row(k, [0, y / of_y, z / of_z]), of_x, &mut nodes[at..][..nx]);
             found(at, of_x, nx.div_ceil(of_x));
         }
     }

@@ -47,7 +47,7 @@ use crate::base::vectors::dispatch;
 use crate::wavelet;
 use corrections::{Decoding, Encoding};
 use known::KnownNodes;
-pub(crate) use known::{Known, Nodes};
+pub(crate) use known::Nodes;
 use refine::gather;
 use stages::{Stages, Step};
 use std::ops::Range;
@@ -222,7 +222,7 @@ impl<'a> PredictionPasses<'a> {
         wanted: &[bool],
         step: f64,
         codes: &SparseCodes,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         field: &mut [R],
     ) -> Vec<bool> {
         let marked = self.marked(codes, known);
@@ -238,7 +238,7 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// For each k, whether some code or known node is not zero; if k is refined, the same for all of them.
-    pub(crate) fn marked<R: Real>(&self, codes: &SparseCodes, known: Option<Known<'_, R>>) -> Vec<bool> {
+    pub(crate) fn marked<R: Real>(&self, codes: &SparseCodes, known: Option<Nodes<'_, R>>) -> Vec<bool> {
         let is_known = |k: usize| known.is_some_and(|known| !known.is_zero(k * self.shape[3]..(k + 1) * self.shape[3]));
         let mut some: Vec<bool> = (0..self.pyramids).map(is_known).collect();
         for (of, runs) in self.boxes.iter().zip(self.runs()).filter(|(of, _)| of.of.is_some()) {
@@ -261,7 +261,7 @@ impl<'a> PredictionPasses<'a> {
         k: usize,
         step: f64,
         codes: &SparseCodes,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         nodes: &mut Vec<R>,
     ) -> bool {
         let some = self.marked(codes, known)[k];
@@ -283,7 +283,7 @@ impl<'a> PredictionPasses<'a> {
         &self,
         step: f64,
         source: Nodes<'_, R>,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         field: &mut [R],
         split: &mut Vec<R>,
         codes: &mut [i32],
@@ -331,7 +331,7 @@ impl<'a> PredictionPasses<'a> {
         parts: &[bool; PARTS],
         step: f64,
         codes: &SparseCodes,
-        known: Option<Known<'_, R>>,
+        known: Option<Nodes<'_, R>>,
         field: &[R],
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
@@ -357,7 +357,7 @@ impl<'a> PredictionPasses<'a> {
         number: usize,
         step: f64,
         codes: &'c SparseCodes,
-        known: Option<Known<'c, R>>,
+        known: Option<Nodes<'c, R>>,
         parts: usize,
     ) -> Decoding<'c, R> {
         let steps = self.passes.iter().map(|pass| (self.step(step, pass), Vec::new()));
@@ -371,7 +371,7 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// The known nodes of the pyramid with this number.
-    fn known<'c, R: Real>(&self, number: usize, known: Known<'c, R>) -> KnownNodes<'c, R> {
+    fn known<'c, R: Real>(&self, number: usize, known: Nodes<'c, R>) -> KnownNodes<'c, R> {
         KnownNodes::new(known, number * self.shape[3], &self.passes)
     }
 

@@ -138,16 +138,20 @@ impl Case {
         }
     }
 
-    /// A block above with random nodes, in which the block begins at `start`: its nodes and size, and those that the block has.
-    fn above(&self, start: [usize; 3], state: &mut u64) -> (Vec<f64>, [usize; 3], HashMap<Node, f64>) {
+    /// The nodes of a random block above that lie in the block: as they are cut out of it, with their number along x, y, z, and
+    /// each at its place. None in the last tier.
+    fn known(&self, state: &mut u64) -> (Vec<f64>, [usize; 3], HashMap<Node, f64>) {
         let (n, outer) = (2 << self.tier, self.outer());
-        let size = std::array::from_fn(|a| start[a] + outer[a].div_ceil(n) + below(3, state));
-        let [nx, ny, nz] = size;
+        let start: [usize; 3] = std::array::from_fn(|_| below(4, state));
+        let own = std::array::from_fn(|a| outer[a].div_ceil(n));
+        let [nx, ny, nz]: [usize; 3] = std::array::from_fn(|a| start[a] + own[a] + below(3, state));
         let nodes: Vec<f64> = (0..nx * ny * nz * self.ks).map(|_| below(1000, state) as f64 / 9.0).collect();
         let at =
             |[x, y, z, k]: Node| nodes[start[0] + x / n + nx * (start[1] + y / n + ny * (start[2] + z / n + nz * k))];
         let known = self.lattice([0; 4], [n, n, n, 1], outer).into_iter().map(|node| (node, at(node))).collect();
-        (nodes, size, if self.is_last() { HashMap::new() } else { known })
+        let mut cut = vec![f64::NAN; own.iter().product::<usize>() * self.ks];
+        Nodes { values: &nodes, size: [nx, ny, nz] }.copy(start, own, &mut cut);
+        (cut, own, if self.is_last() { HashMap::new() } else { known })
     }
 }
 
@@ -156,9 +160,8 @@ fn blocks_of_tiers_decode_as_the_format_says() {
     let state = &mut 17;
     for _ in 0..3000 {
         let case = Case::random(state);
-        let start = std::array::from_fn(|_| below(4, state));
-        let (nodes, size, known) = case.above(start, state);
-        let of = (!case.is_last()).then_some(Known { nodes: Nodes { values: &nodes, size }, start });
+        let (nodes, size, known) = case.known(state);
+        let of = (!case.is_last()).then_some(Nodes { values: &nodes, size });
         let passes = case.passes();
         let listed = passes.list(&some_codes(passes.codes(), state));
         let codes = passes.dense(&listed);
@@ -182,9 +185,8 @@ fn blocks_of_tiers_are_encoded_as_the_format_says() {
     let state = &mut 19;
     for _ in 0..2000 {
         let case = Case::random(state);
-        let start = std::array::from_fn(|_| below(4, state));
-        let (nodes, size, known) = case.above(start, state);
-        let of = (!case.is_last()).then_some(Known { nodes: Nodes { values: &nodes, size }, start });
+        let (nodes, size, known) = case.known(state);
+        let of = (!case.is_last()).then_some(Nodes { values: &nodes, size });
         let passes = case.passes();
         let n = 1 << case.tier;
         let [x, y, z, _] = case.outer().map(|extent| extent.div_ceil(n));

@@ -19,7 +19,8 @@ pub(in crate::render) struct SampledView<'a> {
 impl SampledView<'_> {
     /// The least memory in bytes with which the view can be rendered.
     pub(in crate::render) fn least_memory(&self, scene: &dyn Scene) -> usize {
-        self.bytes(scene, 1, 1)
+        let alone = self.own_bytes(scene, 1, 1);
+        memory::least(|memory| alone + scene.shared_bytes(memory))
     }
 
     /// Renders all frames, as many at a time as fit. `render` makes the pictures of a batch, frame after frame; `give`
@@ -49,6 +50,12 @@ impl SampledView<'_> {
 
     /// Bytes to render `frames` frames together, with `blocks` blocks decoded at a time.
     fn bytes(&self, scene: &dyn Scene, frames: usize, blocks: usize) -> usize {
+        let shared = scene.shared_bytes(self.config.memory);
+        self.own_bytes(scene, frames, blocks) + shared
+    }
+
+    /// As [`Self::bytes`], without those that all blocks share.
+    fn own_bytes(&self, scene: &dyn Scene, frames: usize, blocks: usize) -> usize {
         memory::FIXED + (self.frame_bytes)(frames) + blocks * block_bytes(scene, self.config, frames)
     }
 }

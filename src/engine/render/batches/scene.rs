@@ -55,6 +55,11 @@ pub trait Scene {
     /// An upper bound of the memory of one decoded block, in bytes.
     fn block_bytes(&self) -> usize;
 
+    /// Bytes that all blocks share, within a memory budget.
+    fn shared_bytes(&self, _memory: usize) -> usize {
+        0
+    }
+
     /// An overview: single samples of a few frames, channel after channel, frame after frame, x fastest; NaN for missing
     /// ones. `None`, the default, if the scene only reads whole blocks.
     ///

@@ -79,7 +79,8 @@ impl<'a> Budget<'a> {
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
             let budget = Budget::new(config, kept, scene, setups);
-            budget.fixed + budget.bytes(1, budget.all_double(planes), TILE, 1)
+            let alone = fixed(config, setups) + budget.bytes(1, budget.all_double(planes), TILE, 1);
+            memory::least(|memory| alone + scene.shared_bytes(memory))
         };
         setups.iter().map(least).max().unwrap_or(0)
     }
@@ -88,7 +89,7 @@ impl<'a> Budget<'a> {
     fn new(config: &RenderConfig, kept: Kept, scene: &dyn Scene, setups: &'a [ViewSetup]) -> Self {
         let [of_a_view, together] = kept.bytes(scene.channels(), config);
         let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view);
-        let fixed = fixed(config, setups);
+        let fixed = fixed(config, setups) + scene.shared_bytes(config.memory);
         let available = config.memory.saturating_sub(fixed);
         let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
         let doubles = AtomicUsize::new(0);

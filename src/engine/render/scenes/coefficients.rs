@@ -6,7 +6,7 @@ use super::batch_plan::{BatchPlan, SplatSource};
 use super::coded::CodedBlock;
 use super::needs::FileNeeds;
 use super::overview;
-use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule, left_out};
+use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule};
 use crate::file::promise::share_tolerance;
 use crate::file::{CoefficientFile, DecodedBlock, Prefetch};
 use crate::render::batches::{
@@ -107,11 +107,16 @@ impl Scene for CoefficientScene {
         self.needs.block_bytes
     }
 
+    fn shared_bytes(&self, memory: usize) -> usize {
+        self.file.shared_bytes(memory)
+    }
+
     fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
         overview::overview(&self.file, request, progress).map(Some)
     }
 
     fn open<'a>(&'a mut self, request: &BatchRequest<'a>) -> Result<Box<dyn FrameBatch + 'a>> {
+        self.file.limit_shared(request.config.memory);
         self.fetch_ahead(request)?;
         Ok(Box::new(CoefficientBatch::open(&self.file, self.what, request)?))
     }
@@ -197,7 +202,7 @@ impl<'a> CoefficientBatch<'a> {
         found.left_out += kept.left_out;
         found.other_frames += self.of_other_frames(&kept.entry);
         found.certified = found.certified.max(kept.certified);
-        found.empty -= u64::from(!self.is_nothing(entry) || entry.lost);
+        found.empty -= u64::from(!self.selector.is_nothing(entry) || entry.lost);
         if !self.adds_nothing(kept) {
             found.blocks.push(entry.id.block as usize);
         }
@@ -208,7 +213,8 @@ impl<'a> CoefficientBatch<'a> {
         let BlockStats { min, max, reached, .. } = entry.stats;
         // Without all parts, samples differ from the source by `certified`, and the source differs from the stored
         // range by `reached`.
-        let off = if kept.left_out.parts > 0 { kept.certified + reached } else { 0.0 };
+        let is_whole = kept.left_out.parts == 0 && kept.left_out.blocks == 0;
+        let off = if !is_whole { kept.certified + reached } else { 0.0 };
         let off = off + rounding(self.plan.codec.sample, magnitude((min, max)));
         (min - off, max + off)
     }
@@ -260,17 +266,12 @@ impl<'a> CoefficientBatch<'a> {
             _ => true,
         };
         let parts = entry.parts.iter().filter(|part| needs(part)).copied().collect();
-        left_out(entry, &BlockEntry { parts, ..entry.clone() })
-    }
-
-    /// Whether all samples of a block are zero and none is missing.
-    fn is_nothing(&self, entry: &BlockEntry) -> bool {
-        entry.parts.is_empty() && !entry.begins_above(self.plan.codec.tiers())
+        self.selector.left_out(entry, &BlockEntry { parts, ..entry.clone() })
     }
 
     /// Whether a block adds nothing to any plane.
     fn adds_nothing(&self, kept: &KeptParts) -> bool {
-        self.is_nothing(&kept.entry)
+        self.selector.is_nothing(&kept.entry)
             && !kept.entry.lost
             && (self.plan.layout.error_planes == 0 || kept.errors.iter().all(|e| *e == 0.0))
     }
@@ -299,7 +300,7 @@ impl<'a> CoefficientBatch<'a> {
             if prefetch.is_full() {
                 break;
             }
-            prefetch.add(codec, &self.kept(*block)?.entry, wanted);
+            prefetch.add(codec, &self.kept(*block)?.entry, wanted)?;
         }
         Ok(())
     }

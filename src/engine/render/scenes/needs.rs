@@ -78,5 +78,7 @@ fn block_bytes(file: &CoefficientFile, is_missing: bool) -> usize {
     let missing = if is_missing { 1 + 32 + 24 } else { 0 };
     let stored = leaves().map(|leaf| leaf.coded.saturating_add(leaf.outliers) as usize).max().unwrap_or(0);
     let largest = file.largest_block();
-    largest * (refined + exact + missing) + stored.min(2 * largest) * STORED_BYTES + file.bytes_above()
+    largest * (refined + exact + missing)
+        + stored.min(2 * largest) * STORED_BYTES
+        + file.bytes_to_begin(refined + STORED_BYTES / 2)
 }

@@ -46,7 +46,7 @@ fn fetch(file: &CoefficientFile, request: &OverviewRequest<'_>, windows: &[&[usi
             let (window, codec, frames) = coarse(file, request, frames)?;
             let wanted = wavelet::needed(&codec.synthesis, &frames);
             for entries in file.entries(window, channel, &request.region) {
-                entries?.iter().for_each(|entry| prefetch.add(&codec, entry, &wanted));
+                entries?.iter().try_for_each(|entry| prefetch.add(&codec, entry, &wanted))?;
             }
             Ok(())
         })?;

@@ -169,7 +169,7 @@ impl BlockSelector {
                 });
             }
         }
-        kept.left_out = left_out(entry, &kept.entry);
+        kept.left_out = self.left_out(entry, &kept.entry);
         kept
     }
 
@@ -177,8 +177,8 @@ impl BlockSelector {
         let as_zero = as_zero(block.entry);
         (kept.errors[0], kept.certified) = (as_zero, as_zero);
         let all = levels(block.entry).iter().fold(Alternative::default(), |w, part| self.with(w, part, block));
-        let exact = block.entry.part(PartKind::Exact).is_some();
-        kept.expected = if exact {
+        // The directory does not have the energy of exact samples, nor of the nodes above.
+        kept.expected = if block.entry.is_exact() || block.entry.begins_above(self.tiers) {
             finite(as_zero * as_zero * block.influence.for_alike(f64::INFINITY))
         } else {
             kept.expected + all.change
@@ -259,6 +259,22 @@ impl BlockSelector {
         steps
     }
 
+    /// The parts of a whole entry that `kept` lacks.
+    pub(super) fn left_out(&self, entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
+        let parts = || entry.parts.iter().filter(|p| kept.part(p.kind).is_none());
+        LeftOut {
+            blocks: u64::from(self.is_nothing(kept) && !self.is_nothing(entry)),
+            parts: parts().count() as u64,
+            coefficients: parts().filter(|p| matches!(p.kind, PartKind::Level(_))).map(|p| p.stats.count).sum(),
+            bytes: parts().map(|p| u64::from(p.stored_len)).sum(),
+        }
+    }
+
+    /// Whether all samples of a block are zero and none is missing.
+    pub(super) fn is_nothing(&self, entry: &BlockEntry) -> bool {
+        entry.parts.is_empty() && !entry.begins_above(self.tiers)
+    }
+
     /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block.
     pub(super) fn absolute_sum(&self, entry: &BlockEntry) -> f64 {
         let levels = levels(entry).into_iter();
@@ -299,15 +315,4 @@ fn levels(entry: &BlockEntry) -> Vec<LevelPart> {
         _ => None,
     };
     entry.parts.iter().rev().filter_map(level).collect()
-}
-
-/// The parts of a whole entry that `kept` lacks.
-pub(super) fn left_out(entry: &BlockEntry, kept: &BlockEntry) -> LeftOut {
-    let parts = || entry.parts.iter().filter(|p| kept.part(p.kind).is_none());
-    LeftOut {
-        blocks: u64::from(kept.parts.is_empty() && !entry.parts.is_empty()),
-        parts: parts().count() as u64,
-        coefficients: parts().filter(|p| matches!(p.kind, PartKind::Level(_))).map(|p| p.stats.count).sum(),
-        bytes: parts().map(|p| u64::from(p.stored_len)).sum(),
-    }
 }
