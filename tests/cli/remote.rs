@@ -75,7 +75,8 @@ fn few_requests_bring_little_more_than_is_needed() {
 
     work.remote(&server, "$WAVESPLAT extract URL --region 20:21,9:10,7:8 -o series.npy").ok();
     let (requests, sent) = server.traffic();
-    assert!(requests <= 10 && sent <= 768 << 10, "a series: {requests} requests, {sent} bytes");
+    // what is coarse in a window comes with the directory of the window before
+    assert!(requests <= 11 && sent <= 640 << 10, "a series: {requests} requests, {sent} bytes");
 
     work.remote(&server, "$RENDER URL --size 64x48 --range 0,1 -o f_%02d.png").ok();
     let (requests, sent) = server.traffic();
