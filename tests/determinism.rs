@@ -96,9 +96,9 @@ const DIGESTS: [u64; 13] = [
     0xd24b_ca35_83e3_f948,
     0x41a3_eda1_42a1_b847,
     0x4463_9dc6_be5d_958e,
-    0x95ea_b186_23ea_b30b,
-    0x357c_6bdb_f2ad_9946,
-    0x65fe_e095_0e8d_6829,
+    0x3c49_b785_ce41_00b5,
+    0x2988_8a19_1539_1b57,
+    0x9ffb_3c42_eb54_718f,
 ];
 
 #[test]

@@ -50,7 +50,7 @@ fn picked(samples: &[u8], ty: SampleType, declared: Option<f64>, request: &Overv
 
 fn request<'a>(scene: &dyn Scene, stride: usize, frames: &'a [usize]) -> OverviewRequest<'a> {
     let thinning = Thinning { blocks: scene.blocks(), stride };
-    OverviewRequest { thinning, frames, region: Region { start: [0; 3], end: DIMS } }
+    OverviewRequest { thinning, frames, memory: MEMORY, region: Region { start: [0; 3], end: DIMS } }
 }
 
 /// Frames at multiples of 4 from the first of their window, which every pyramid codes first.

@@ -3,7 +3,7 @@
 use crate::directory::{BLOCK_ENTRY, PART_ENTRY, begins_above};
 use crate::limits::{MAX_PART_RAW, align};
 use crate::section::{FRAME, decompress};
-use crate::{Error, Result};
+use crate::{Error, Metadata, Result};
 use std::cmp::{Ordering, Reverse};
 use std::fmt;
 
@@ -170,9 +170,11 @@ pub struct EncodedBlock {
 }
 
 impl EncodedBlock {
-    /// As [`BlockEntry::begins_above`](crate::BlockEntry::begins_above).
-    pub fn begins_above(&self, tiers: u8) -> bool {
-        begins_above(self.id, self.stats, self.parts.iter().any(|part| part.kind == PartKind::Exact), tiers)
+    /// As [`BlockEntry::block_above`](crate::BlockEntry::block_above).
+    pub(crate) fn block_above(&self, metadata: &Metadata) -> Option<BlockId> {
+        let is_exact = self.parts.iter().any(|part| part.kind == PartKind::Exact);
+        let begins = begins_above(self.id, self.stats, is_exact, metadata.tiers(self.id.window));
+        begins.then(|| metadata.above(self.id))
     }
 
     /// Bytes of the block in a file, up to what follows it.

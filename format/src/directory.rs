@@ -5,7 +5,7 @@ use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount,
 use crate::file_id::FileId;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
 use crate::section::{FRAME, SectionId, read, read_checked};
-use crate::{Result, Storage};
+use crate::{Metadata, Result, Storage};
 
 /// Bytes of a block's entry without its part entries.
 pub(crate) const BLOCK_ENTRY: usize = 64;
@@ -65,6 +65,11 @@ impl BlockEntry {
     /// block of tier 0 are zero.
     pub fn begins_above(&self, tiers: u8) -> bool {
         begins_above(self.id, self.stats, self.is_exact(), tiers)
+    }
+
+    /// The block with whose nodes it begins, if it does.
+    pub fn block_above(&self, metadata: &Metadata) -> Option<BlockId> {
+        self.begins_above(metadata.tiers(self.id.window)).then(|| metadata.above(self.id))
     }
 
     /// Bytes of its parts in the file, without header and padding.

@@ -319,6 +319,14 @@ impl Metadata {
         BlockId { block: (x + of_x * (y + of_y * z)) as u32, tier, ..id }
     }
 
+    /// The block of a tier whose box has that of a block.
+    pub fn above_in(&self, mut id: BlockId, tier: u8) -> BlockId {
+        while id.tier < tier {
+            id = self.above(id);
+        }
+        id
+    }
+
     /// Number of leaves that describe a window.
     pub(crate) fn leaves_of_window(&self, window: u32) -> u64 {
         let leaves = |tier| u64::from(self.blocks_per_channel(tier).div_ceil(BLOCKS_PER_LEAF));

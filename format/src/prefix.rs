@@ -168,7 +168,8 @@ fn plain_at(
     same.map_err(|what| section.corrupt(offset, what)).map(|()| (extent, content))
 }
 
-/// Reads the entry in the own header, at `offset`, of a block in a window with so many tiers; returns it and the end of the block's parts. Does not read the parts.
+/// Reads a block's entry from its own header at `offset`. `tiers` is the number of tiers of its window. Returns the entry and the end
+/// of its parts, which are not read.
 pub(crate) fn block_at(
     storage: &impl Storage,
     file: FileId,

@@ -153,11 +153,9 @@ impl Recovery {
                 let entries = self.leaf(storage, first, count);
                 for (block, entry) in (first.block..).zip(entries) {
                     let id = BlockId { block, ..first };
-                    let tiers = self.metadata.tiers(window);
                     // Blocks come after the one above them, in the order of their ids.
-                    let begins_intact = |block: &EncodedBlock| {
-                        !block.begins_above(tiers) || lost.binary_search(&self.metadata.above(id)).is_err()
-                    };
+                    let is_lost = |above| lost.binary_search(&above).is_ok();
+                    let begins_intact = |block: &EncodedBlock| !block.block_above(&self.metadata).is_some_and(is_lost);
                     match self.block(storage, id, entry)?.filter(begins_intact) {
                         Some(block) => {
                             end.add(&block);

@@ -121,10 +121,10 @@ fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
     let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {}", places(r.damaged)) };
     let mut text = format!("{} blocks, {} bytes: {state}\n", r.blocks, r.bytes);
     if r.unchecked > 0 {
-        text += &format!(
-            "  {} more blocks could not be checked: their directory, or a block above them, is damaged\n",
-            r.unchecked
-        );
+        text += &format!("  {} more blocks could not be checked: their directory is damaged\n", r.unchecked);
+    }
+    if r.undecoded > 0 {
+        text += &format!("  {} more blocks could not be decoded: a block above them is damaged\n", r.undecoded);
     }
     let shown = r.damage.len().min(MOST_SHOWN);
     r.damage[..shown].iter().for_each(|damage| text += &format!("  {damage}\n"));

@@ -14,10 +14,12 @@ pub struct Buffer<T: Pooled> {
 }
 
 impl<T: Pooled> Buffer<T> {
-    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough, or a new one.
+    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and not twice as
+    /// long, or a new one.
     pub fn with_len(len: usize) -> Self {
         let mut spare = spare::<T>();
-        let fits = (0..spare.len()).filter(|n| spare[*n].len() >= len).min_by_key(|n| spare[*n].len());
+        let fits =
+            (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len())).min_by_key(|n| spare[*n].len());
         let values = fits.map(|n| spare.swap_remove(n));
         drop(spare);
         Self { values: values.unwrap_or_else(|| vec![T::default(); len]), len }

@@ -11,7 +11,7 @@ use super::field::{Above, Field, Plane, Stored};
 use super::rows::Change;
 use crate::base::sample::{self, SampleType};
 use std::collections::HashMap;
-use wavesplat_format::{Axis, Basis, BlockEntry, EncodedBlock, Outliers, PartEntry, PartKind, Reader, Result, Storage};
+use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -66,23 +66,6 @@ impl Block {
         block.read_codes(reader, codec, entry, wanted)?;
         block.bytes_read += entry.parts.iter().filter(|p| !is_level(p)).map(|p| u64::from(p.stored_len)).sum::<u64>();
         Ok(block)
-    }
-
-    /// A block of `of` voxels as it will be stored, of a tier above 0.
-    ///
-    /// # Errors
-    /// Its parts cannot be unpacked.
-    pub fn from_encoded(
-        codec: &WindowCodec,
-        encoded: &EncodedBlock,
-        of: [usize; 3],
-        above: Option<Above>,
-    ) -> Result<Self> {
-        let none =
-            Self { missing: Default::default(), step: encoded.stats.step, above, ..Self::missing(codec, [1; 3]) };
-        let Some(pyramid) = &codec.scheme.pyramid else { return Ok(Self { of, ..none }) };
-        let codes = Codes::Sparse(codec.passes(pyramid, of).unpack(encoded)?);
-        Ok(Self { of, codes, ..none })
     }
 
     /// The parts that [`Self::read`] reads.

@@ -2,13 +2,13 @@
 
 use super::WindowCodec;
 use super::buffer::Buffer;
-use super::codes::Codes;
+use super::codes::{Codes, PooledCodes};
 use super::pyramid::{Nodes, PARTS, PredictionPasses};
 use super::real::Real;
 use super::rows::{self, Change};
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
-use wavesplat_format::{Pyramid, SparseCodes};
+use wavesplat_format::{EncodedBlock, Pyramid, SparseCodes};
 
 /// The decoded coefficients of a block.
 #[derive(Debug, Clone)]
@@ -154,6 +154,22 @@ impl Field<'static> {
             None => (Values::Zero, vec![false; codec.basis.coefficients()]),
         };
         Self { values, marked }
+    }
+
+    /// Decodes the nodes of a block of a tier above 0 that is not yet stored, and covers `size` voxels.
+    ///
+    /// # Errors
+    /// Its parts cannot be unpacked.
+    pub fn from_encoded(
+        codec: &WindowCodec,
+        block: &EncodedBlock,
+        size: [usize; 3],
+        above: Option<&Above>,
+    ) -> wavesplat_format::Result<Self> {
+        let codes =
+            codec.scheme.pyramid.as_ref().map(|pyramid| codec.passes(pyramid, size).unpack(block)).transpose()?;
+        let all = vec![true; codec.basis.coefficients()];
+        Ok(Self::refined(codec, size, block.stats.step, &codes.unwrap_or_else(PooledCodes::new), above, &all))
     }
 
     /// The decoded nodes of a block of a tier above 0, as its encoder has them.

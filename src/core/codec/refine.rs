@@ -44,9 +44,11 @@ impl Checked {
         self.listed.count().saturating_add(outliers.saturating_mul(CODES_PER_OUTLIER))
     }
 
-    /// Whether outliers take a large share of the bytes.
-    fn has_many_outliers(&self) -> bool {
-        self.tally.as_ref().is_none_or(|tally| tally.outliers.len() * CODES_PER_OUTLIER > self.listed.count())
+    /// Whether outliers take a large share of the bytes of a block with so many samples, and of the samples.
+    fn has_many_outliers(&self, samples: usize) -> bool {
+        let is_large =
+            |outliers: usize| outliers * CODES_PER_OUTLIER > self.listed.count() && outliers > samples / FEW_OUTLIERS;
+        self.tally.as_ref().is_none_or(|tally| is_large(tally.outliers.len()))
     }
 }
 
@@ -90,25 +92,26 @@ impl Source<'_> {
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
         outer.load(&weighing, source);
-        let mut encode = |step| {
-            let nodes = Nodes { values: &*source, size: outer.size };
-            let fits = passes.encode(step, nodes, known, field, split, codes);
-            fits.then(|| self.checked(&weighing, &passes, known, field, codes))
+        let nodes = Nodes { values: &*source, size: outer.size };
+        let mut encode = |step, field: &mut Vec<R>, codes: &mut Vec<i32>| {
+            passes.encode(step, nodes, known, field, split, codes).then_some(())
         };
-        let mut checked = encode(step)?;
+        encode(step, field, codes)?;
+        let check = |field: &[R], codes: &[i32]| self.checked(&weighing, &passes, known, field, codes);
+        let mut checked = check(field, codes);
         let finest = step / self.codec.scheme.coarseness.max(1.0);
-        while checked.has_many_outliers() && step > finest {
-            let (coarser, before) = (step, checked.cost());
-            step = (step / FINER).max(finest);
-            checked = encode(step)?;
-            if self.codec.tiers() > 0 && before <= checked.cost() {
-                step = coarser; // finer steps leave the errors of known nodes
-                checked = encode(step)?;
+        while checked.has_many_outliers(self.missing.mask.len()) && step > finest {
+            let finer = (step / FINER).max(finest);
+            encode(finer, field, codes)?;
+            let found = check(field, codes);
+            if checked.cost() <= found.cost() {
+                encode(step, field, codes)?; // finer steps leave the errors of known nodes
                 break;
             }
+            (step, checked) = (finer, found);
         }
         let Checked { listed, tally } = checked;
-        let mut tally = if self.codec.tier > 0 { Tally::new() } else { tally? };
+        let mut tally = tally?;
         let outliers = tally.take_outliers(self.codec, self.samples);
         // The directory lists no other parts.
         let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field);
@@ -148,6 +151,7 @@ impl Source<'_> {
     ) -> Checked {
         let listed = passes.list(codes);
         let tally = match self.plain() {
+            _ if self.codec.tier > 0 => Some(Tally::new()), // its samples are stored with the blocks below
             true => self.check_samples(field),
             false => self.check_series(weighing, field, &passes.marked(&listed, known)),
         };
@@ -308,6 +312,10 @@ const SAMPLING: usize = 3;
 /// A block is stored exactly if more than one sample in this many misses the bound, because an outlier takes more bytes
 /// than a sample of an exact block.
 const MOST_OUTLIERS: usize = 8;
+
+/// Finer steps are tried if more than one sample in this many misses the bound: fewer take little, and each step takes as long as
+/// coding the block.
+const FEW_OUTLIERS: usize = 512;
 
 /// A finer step is tried if fewer codes than this come with an outlier. An outlier takes as many bytes as about eight.
 const CODES_PER_OUTLIER: usize = 8;

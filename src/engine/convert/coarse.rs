@@ -3,13 +3,13 @@
 use super::Plan;
 use super::plan::SPOOLED;
 use crate::file::above::{AboveBlocks, AboveKey, PlaceAbove};
-use std::collections::HashMap;
+use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use tempfile::{SpooledTempFile, spooled_tempfile};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::codec::WindowCodec;
-use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::{Above, Field};
 use wavesplat_format::{BlockId, EncodedBlock, EncodedPart};
 
@@ -21,17 +21,29 @@ pub(super) struct CoarseBlocks {
 }
 
 impl CoarseBlocks {
-    /// No blocks yet. Decoded ones take up to their share of the memory.
-    pub(super) fn new(memory: usize, plan: &Plan<'_>) -> Self {
-        Self { coded: Mutex::default(), decoded: AboveBlocks::within(memory, plan.bytes_above) }
+    /// No blocks yet. Decoded ones, of so many bytes each, take up to their share of the memory.
+    pub(super) fn new(memory: usize, bytes: usize) -> Self {
+        Self { coded: Mutex::default(), decoded: AboveBlocks::within(memory, bytes) }
     }
 
     /// Adds a coded block and its decoded nodes.
     pub(super) fn add(&self, codec: &WindowCodec, block: &EncodedBlock, field: Field<'static>) -> Result<()> {
         let (id, all) = (block.id, vec![true; codec.basis.coefficients()]);
         self.coded(|coded| coded.add(block))?;
-        self.decoded.field(AboveKey { id, lod: 0, wanted: all }, || Ok(Arc::new(field)))?;
+        self.decoded.field(&AboveKey { id, lod: 0, wanted: all }, || Ok(Arc::new(field)))?;
         Ok(())
+    }
+
+    /// Decodes what some blocks share, side by side, so that no thread waits for another later; as much as stays decoded.
+    pub(super) fn decode_shared(
+        &self,
+        plan: &Plan<'_>,
+        codec: &WindowCodec,
+        ids: impl Iterator<Item = BlockId>,
+    ) -> Result<()> {
+        let above = ids.filter(|id| id.tier < codec.tiers()).map(|id| plan.start.above(id));
+        let above: Vec<BlockId> = above.collect::<BTreeSet<_>>().into_iter().take(self.decoded.most()).collect();
+        above.par_iter().try_for_each(|id| self.field(plan, &codec.at(id.tier, 0), *id).map(drop))
     }
 
     /// The nodes that a block begins with; none in the last tier.
@@ -39,15 +51,18 @@ impl CoarseBlocks {
         let codec = codec.at(id.tier, 0);
         let Some(codec_above) = codec.above() else { return Ok(None) };
         let place = PlaceAbove::new(&plan.start, &codec, &codec_above, id);
-        let all = vec![true; codec.basis.coefficients()];
-        let decode = || {
-            let above = self.above(plan, &codec, place.id)?;
-            let coded = self.coded(|coded| coded.block(place.id))?;
-            let block = Block::from_encoded(&codec_above, &coded, plan.size(place.id), above).map_err(super::bug)?;
-            Ok(Arc::new(block.refined(&codec_above, &all)))
-        };
-        let field = self.decoded.field(AboveKey { id: place.id, lod: 0, wanted: all.clone() }, decode)?;
+        let field = self.field(plan, &codec_above, place.id)?;
         Ok(Some(place.cut(&field)))
+    }
+
+    /// The nodes of a coded block, kept or decoded now.
+    fn field(&self, plan: &Plan<'_>, codec: &WindowCodec, id: BlockId) -> Result<Arc<Field<'static>>> {
+        let key = AboveKey { id, lod: 0, wanted: vec![true; codec.basis.coefficients()] };
+        self.decoded.field(&key, || {
+            let (above, coded) = (self.above(plan, codec, id)?, self.coded(|coded| coded.block(id))?);
+            let field = Field::from_encoded(codec, &coded, plan.size(id), above.as_ref());
+            field.map(Arc::new).map_err(super::bug)
+        })
     }
 
     fn coded<T>(&self, with: impl FnOnce(&mut CodedBlocks) -> io::Result<T>) -> Result<T> {

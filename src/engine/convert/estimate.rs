@@ -81,7 +81,7 @@ pub fn estimates(
     let is_rough = source_archive.grid.whole().voxels().saturating_mul(frames) > FEW_SAMPLES;
     let all = plan.blocks.len().saturating_mul(frames.div_ceil(first.config.window));
     let most = if is_rough { blocks_of_window(all, windows.len() * configs.len()) } else { BLOCKS };
-    let most = if plan.tiers() > 0 { most / 2 } else { most }; // and those above
+    let most = if plan.tiers > 0 { (most / 2).max(LEAST_BLOCKS) } else { most }; // and those above
     let blocks = some_blocks(&plan.blocks, most);
     progress.start(Some((windows.len() * configs.len()) as u64));
     let read = FramesRead {
@@ -98,7 +98,14 @@ pub fn estimates(
         let plan = Plan::new(&asked)?;
         let range = *input.config.range.get_or_insert(found);
         let (config, archive) = (&input.config, &input.archive);
-        let coded = BlocksCoded { input: &input, plan: &plan, blocks: &blocks, range: found, is_rough };
+        let coded = BlocksCoded {
+            input: &input,
+            plan: &plan,
+            blocks: &blocks,
+            range: found,
+            is_rough,
+            encoders: Encoders::default(),
+        };
         let bytes = coded.bytes(source, &windows, frames, &mut scheme, progress)?;
         let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
         let error = range_bound(config.tolerance, range);
@@ -199,6 +206,7 @@ struct BlocksCoded<'a> {
     range: (f64, f64),
     /// Whether schemes are chosen with less care.
     is_rough: bool,
+    encoders: Encoders,
 }
 
 /// The compressed share of a leaf of the directory, as measured on files of many kinds.
@@ -243,13 +251,12 @@ impl BlocksCoded<'_> {
         window: &dyn FrameWindow,
         job: &Arc<WindowJob>,
     ) -> Result<f64> {
-        let (ids, encoders, idle) = (self.ids(job.index, tier), Encoders::default(), Pool::default());
-        let (mut bytes, mut voxels) = (0.0, 0);
-        for ids in ids.chunks(self.plan.batch) {
+        let (ids, mut bytes, mut voxels) = (self.ids(job.index, tier), 0.0, 0);
+        for ids in ids.chunks(self.plan.batch(&job.codec)) {
             let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
             let batch = Batch { window: job.clone(), blocks, last: false };
             for Encoded { block, .. } in
-                encode_batch(self.input.config.level, self.plan, &encoders, &idle, batch)?.blocks
+                encode_batch(self.input.config.level, self.plan, &self.encoders, reader.idle, batch)?.blocks
             {
                 bytes += block.stored_len() as f64 + LEAF_SHARE * block.entry_len() as f64;
                 voxels += self.plan.size(block.id).iter().product::<usize>();
@@ -262,10 +269,7 @@ impl BlocksCoded<'_> {
     /// The coded blocks of a tier: those that were chosen, or the ones above them.
     fn ids(&self, window: u32, tier: u8) -> Vec<BlockId> {
         let start = &self.plan.start;
-        let above = |block: &usize| {
-            let chosen = BlockId::new(window, 0, *block as u32);
-            (0..tier).fold(chosen, |id, _| start.above(id))
-        };
+        let above = |block: &usize| start.above_in(BlockId::new(window, 0, *block as u32), tier);
         let of_channel = self.blocks.iter().map(above).collect::<BTreeSet<_>>();
         let channels = 0..self.plan.channels() as u16;
         channels.flat_map(|channel| of_channel.iter().map(move |id| BlockId { channel, ..*id })).collect()

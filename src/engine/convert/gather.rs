@@ -82,7 +82,7 @@ pub(super) struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
     /// Buffers for the samples of blocks.
-    idle: &'a Pool<Vec<u8>>,
+    pub(super) idle: &'a Pool<Vec<u8>>,
     /// The archive of the coded samples.
     archive: &'a Archive,
     /// The pixels of a sampled bound.
@@ -116,7 +116,7 @@ impl<'a> WindowReader<'a> {
         let features = done.features.unwrap_or(Features {
             packing,
             described: archive.description.is_some(),
-            tiered: packing == Packing::Nested && plan.tiers() > 0,
+            tiered: plan.tiers > 0,
         });
         let (id, range, scheme) = (done.id, None, None);
         Self {
@@ -242,7 +242,7 @@ impl<'a> WindowReader<'a> {
             most: if self.is_rough { most / ROUGH } else { most },
             edge: self.plan.blocks.edges[0],
             packing: self.features.packing,
-            tiers: if self.features.tiered { self.plan.tiers() } else { 0 },
+            tiers: if self.features.tiered { self.plan.tiers } else { 0 },
             before,
         };
         let mut codec = selector.choose()?;
@@ -255,7 +255,7 @@ impl<'a> WindowReader<'a> {
         let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        let coarse = CoarseBlocks::new(self.config.memory, self.plan);
+        let coarse = CoarseBlocks::new(self.config.memory, self.plan.bytes_above(&codec));
         let (features, digest) = (self.features, scan.digest);
         Ok(WindowJob { index, first_frame, id, features, codec, coarse, range, digest, times })
     }
@@ -358,7 +358,9 @@ impl<'a> WindowReader<'a> {
             (0..plan.channels() as u16).flat_map(of_channel).collect()
         };
         let tiers = (0..=job.codec.tiers()).rev();
-        tiers.flat_map(|tier| of_tier(tier).chunks(plan.batch).map(<[BlockId]>::to_vec).collect::<Vec<_>>()).collect()
+        tiers
+            .flat_map(|tier| of_tier(tier).chunks(plan.batch(&job.codec)).map(<[BlockId]>::to_vec).collect::<Vec<_>>())
+            .collect()
     }
 
     /// Reads the samples that coding one block takes, frame by frame.

@@ -410,6 +410,7 @@ fn encode_batch(
         read.put(samples);
         encoded
     };
+    window.coarse.decode_shared(plan, &window.codec, blocks.iter().map(|block| block.id))?;
     let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
     Ok(EncodedBatch { window: window.clone(), blocks: blocks?, last })
 }

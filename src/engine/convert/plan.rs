@@ -23,10 +23,13 @@ pub(super) struct Plan<'a> {
     /// The metadata before the first frame.
     pub(super) start: Metadata,
     pub(super) blocks: BlockGrid,
-    /// Blocks that are gathered, encoded and written together.
-    pub(super) batch: usize,
-    /// Bytes of the decoded nodes of a block above others; 0 without tiers.
-    pub(super) bytes_above: usize,
+    /// Blocks that are gathered, encoded and written together, if their coefficients are coded in 32-bit floats.
+    batch_of_singles: usize,
+    /// The same for 64-bit floats.
+    batch_of_doubles: usize,
+    /// The tiers above the blocks: the least number for which the last has one block, at most [`MAX_TIERS`]. 0 without pyramids, or if
+    /// blocks cannot be halved.
+    pub(super) tiers: u8,
 }
 
 /// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
@@ -83,11 +86,6 @@ impl<'a> Plan<'a> {
         blocks_of_tier(self.blocks, tier)
     }
 
-    /// The least number of tiers for which the last has one block; at most [`MAX_TIERS`]; 0 if blocks cannot be halved.
-    pub(super) fn tiers(&self) -> u8 {
-        tiers(self.blocks)
-    }
-
     /// The nodes of a block of a tier above 0, and how many samples along x, y, z they are made from.
     pub(super) fn coarse_nodes(&self, codec: &WindowCodec, id: BlockId) -> BlockWithGhosts {
         let size = codec.decoded_size(self.size(id));
@@ -127,10 +125,28 @@ impl<'a> Plan<'a> {
                 format!("{edge} voxels a side give more than 2^32 blocks; take larger ones"),
             ));
         }
-        let bytes_above = bytes_above(input, blocks);
-        let batch = batch_len(input, blocks, bytes_above)?;
+        let tiers = if config.has_pyramids() { tiers(blocks) } else { 0 };
+        let batch_of_doubles = batch_len(input, blocks, tiers, size_of::<f64>())?;
+        let batch_of_singles = batch_len(input, blocks, tiers, size_of::<f32>())?;
         let start = start(input, edge);
-        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, batch, bytes_above })
+        Ok(Self {
+            start,
+            colour_transform: colour_transform.as_ref(),
+            blocks,
+            batch_of_singles,
+            batch_of_doubles,
+            tiers,
+        })
+    }
+
+    /// The number of blocks that are gathered, encoded and written together.
+    pub(super) fn batch(&self, codec: &WindowCodec) -> usize {
+        if bytes_of_coefficient(codec) == size_of::<f32>() { self.batch_of_singles } else { self.batch_of_doubles }
+    }
+
+    /// Bytes of the decoded nodes of a block above others.
+    pub(super) fn bytes_above(&self, codec: &WindowCodec) -> usize {
+        bytes_above(self.blocks, codec.basis.coefficients(), bytes_of_coefficient(codec))
     }
 
     pub(super) fn channels(&self) -> usize {
@@ -152,7 +168,7 @@ fn blocks_of_tier(blocks: BlockGrid, tier: u8) -> BlockGrid {
     BlockGrid::cubes(blocks.dims, blocks.edges[0] << tier)
 }
 
-/// As [`Plan::tiers`].
+/// As [`Plan::tiers`], with pyramids.
 fn tiers(blocks: BlockGrid) -> u8 {
     let is_one = |tier: &u8| blocks_of_tier(blocks, *tier).len() == 1;
     let is_even = blocks.edges[0].is_multiple_of(2);
@@ -160,11 +176,16 @@ fn tiers(blocks: BlockGrid) -> u8 {
     if is_even { tiers } else { 0 }
 }
 
-/// Bytes of the decoded nodes of a block above others.
-fn bytes_above(input: &CodedInput, blocks: BlockGrid) -> usize {
+/// Bytes of the decoded nodes of a block above others, with `each` bytes for a coefficient.
+fn bytes_above(blocks: BlockGrid, coefficients: usize, each: usize) -> usize {
     let nodes: usize = blocks.region(0).dims().iter().map(|n| n + 1).product();
-    let has_tiers = input.config.has_pyramids() && tiers(blocks) > 0;
-    if has_tiers { nodes * most_coefficients(&input.config) * size_of::<f64>() } else { 0 }
+    nodes * coefficients * each
+}
+
+/// Bytes of a coefficient that a window's pyramid refines.
+fn bytes_of_coefficient(codec: &WindowCodec) -> usize {
+    let is_single = codec.scheme.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
+    if is_single { size_of::<f32>() } else { size_of::<f64>() }
 }
 
 /// Checks that the tolerance or error is valid for this bound and these samples.
@@ -216,8 +237,8 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
 }
 
 /// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
-/// workers' scratch, and what choosing the next window's scheme takes.
-fn batch_len(input: &CodedInput, blocks: BlockGrid, above: usize) -> Result<usize> {
+/// workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
+fn batch_len(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result<usize> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
@@ -227,7 +248,8 @@ fn batch_len(input: &CodedInput, blocks: BlockGrid, above: usize) -> Result<usiz
     let channel_bytes = colour_transform.as_ref().map_or(0, |_| samples * sample.size());
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
     let has_pyramids = config.has_pyramids();
-    let field = if has_pyramids { 2 * voxels * most_coefficients(config) * size_of::<f64>() } else { 0 };
+    let field = if has_pyramids { 2 * voxels * most_coefficients(config) * each } else { 0 };
+    let above = if tiers > 0 { bytes_above(blocks, most_coefficients(config), each) } else { 0 };
     let choice = if has_pyramids { choose::bytes(samples, sample) } else { 0 };
     let threads = |batch: usize| batch.min(rayon::current_num_threads());
     let begin = above / 4; // the nodes that lie in a block, of which each has one part in eight, and more at faces

@@ -21,7 +21,7 @@ pub(crate) struct AboveBlocks {
     leaves: Mutex<VecDeque<(BlockId, Arc<Vec<BlockEntry>>)>>,
 }
 
-/// Leaves that stay in memory: those of a block in every tier.
+/// Leaves that stay in memory: usually enough for one in every tier.
 const LEAVES: usize = 8;
 
 /// What is decoded of a block.
@@ -36,13 +36,23 @@ pub(crate) struct AboveKey {
 /// Empty until one thread has decoded it; others wait.
 type Slot = Arc<Mutex<Option<Arc<Field<'static>>>>>;
 
-/// Decoded blocks above others take one part in so many of a memory budget.
+/// The decoded blocks take at most one part in so many of a memory budget.
 const SHARE: usize = 8;
 
 impl AboveBlocks {
     /// Room for the blocks of `bytes` bytes each that fit in their share of a memory budget; at least one.
     pub(crate) fn within(memory: usize, bytes: usize) -> Self {
         Self { most: AtomicUsize::new(blocks_within(memory, bytes)), kept: Mutex::default(), leaves: Mutex::default() }
+    }
+
+    /// The largest number of blocks that stay decoded.
+    pub(crate) fn most(&self) -> usize {
+        self.most.load(Relaxed)
+    }
+
+    /// As many, without any yet.
+    pub(super) fn emptied(&self) -> Self {
+        Self { most: AtomicUsize::new(self.most()), kept: Mutex::default(), leaves: Mutex::default() }
     }
 
     /// Changes the memory budget of which they take a share.
@@ -71,25 +81,27 @@ impl AboveBlocks {
     /// A decoded block.
     pub(crate) fn field(
         &self,
-        key: AboveKey,
+        key: &AboveKey,
         decode: impl FnOnce() -> Result<Arc<Field<'static>>>,
     ) -> Result<Arc<Field<'static>>> {
-        let slot = self.slot(key);
-        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*slot {
-            Some(field) => Ok(field.clone()),
-            None => Ok(slot.insert(decode()?).clone()),
+        let slot = self.slot(key, None);
+        let mut decoded = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(field) = &*decoded {
+            return Ok(field.clone());
         }
+        let field = decoded.insert(decode()?).clone();
+        self.slot(key, Some(&slot)); // is used later than those above it
+        Ok(field)
     }
 
-    /// The place of a decoded block. The least recently used ones make room.
-    fn slot(&self, key: AboveKey) -> Slot {
+    /// The place of a decoded block, which becomes the most recently used one: the known place, or that in which it was decoded, or a
+    /// new one. The least recently used blocks make room.
+    fn slot(&self, key: &AboveKey, decoded: Option<&Slot>) -> Slot {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = kept.iter().position(|(kept, _)| *kept == key).map(|at| kept.remove(at));
-        let used = found.unwrap_or_else(|| (key, Slot::default()));
-        let slot = used.1.clone();
-        kept.push(used);
-        let old = kept.len().saturating_sub(self.most.load(Relaxed));
+        let known = kept.iter().position(|(of, _)| of == key).map(|at| kept.remove(at).1);
+        let slot = known.or_else(|| decoded.cloned()).unwrap_or_default();
+        kept.push((key.clone(), slot.clone()));
+        let old = kept.len().saturating_sub(self.most());
         kept.drain(..old);
         slot
     }
@@ -124,10 +136,7 @@ pub(crate) struct PlaceAbove {
 impl PlaceAbove {
     /// The place of a block of a file; `above` is the codec of blocks above.
     pub(crate) fn new(file: &Metadata, codec: &WindowCodec, above: &WindowCodec, id: BlockId) -> Self {
-        let mut id_above = id;
-        while id_above.tier < above.tier {
-            id_above = file.above(id_above);
-        }
+        let id_above = file.above_in(id, above.tier);
         let [own, outer] = [id, id_above].map(|id| file.block_box(id.tier, id.block).unwrap_or_default());
         let apart = u32::from(above.tier) + above.lod;
         let start = std::array::from_fn(|a| ((own.0[a] - outer.0[a]) >> apart) as usize);

@@ -236,7 +236,8 @@ impl CoefficientFile {
     /// and exactly stored samples.
     pub fn block_bytes(&self) -> usize {
         let payload = 5;
-        let refined = payload + size_of::<i32>() + size_of::<f64>();
+        let is_double = self.metadata().windows.iter().any(|w| w.pyramid.as_ref().is_none_or(|p| !p.single));
+        let refined = payload + size_of::<i32>() + if is_double { size_of::<f64>() } else { size_of::<f32>() };
         self.largest_block() * (refined + 1 + self.sample().size()) + self.bytes_to_begin(refined)
     }
 
@@ -326,13 +327,8 @@ impl CoefficientFile {
             skipped.meet(entry.id);
             return Ok(Block::missing(codec, size));
         }
-        let (above, bytes_above) = match entry.begins_above(codec.tiers()) {
-            true => self.above(codec, entry.id, wanted)?,
-            false => (None, 0),
-        };
-        let mut block = Block::read(&self.reader, codec, entry, size, wanted, above).map_err(|e| self.failed(e))?;
-        block.bytes_read += bytes_above;
-        Ok(block)
+        let above = if entry.begins_above(codec.tiers()) { self.above(codec, entry.id, wanted)? } else { None };
+        Block::read(&self.reader, codec, entry, size, wanted, above).map_err(|e| self.failed(e))
     }
 
     /// All voxels of a block, decoded or not.

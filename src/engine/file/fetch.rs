@@ -25,8 +25,8 @@ pub struct Prefetch<'a> {
     pages: PageCount,
 }
 
-/// What is coarse in a window is fetched together with its directory if it has at most so many bytes: about what a server sends
-/// in the time of one more request.
+/// For a part of the volume, what is coarse in a window is fetched together with its directory if it has at most so many bytes:
+/// about what a server sends in the time of one more request.
 const FEW_BYTES: u64 = 128 << 10;
 
 impl<'a> Prefetch<'a> {
@@ -72,7 +72,7 @@ impl<'a> Prefetch<'a> {
             self.parts.push(*part);
         }
         let Some(above) = codec.above().filter(|codec| entry.begins_above(codec.tiers())) else { return Ok(()) };
-        let id = self.file.id_above(entry.id, above.tier);
+        let id = self.file.metadata().above_in(entry.id, above.tier);
         match self.above.insert(id) {
             true => self.add(&above, &self.file.entry_above(id)?, &wanted_above(codec, wanted)),
             false => Ok(()),
@@ -121,9 +121,10 @@ impl CoefficientFile {
         channel: usize,
         region: &Region,
     ) -> Result<()> {
+        let is_part = *region != self.grid.whole(); // otherwise it comes with the blocks
         let ranges = |window| {
             let above = self.leaves_above(window, channel, region).map(LeafEntry::bytes);
-            let coarse = self.coarse_bytes(window).filter(|bytes| bytes.end - bytes.start <= FEW_BYTES);
+            let coarse = self.coarse_bytes(window).filter(|bytes| is_part && bytes.end - bytes.start <= FEW_BYTES);
             coarse.into_iter().chain(above).chain(self.reached(window, channel, region).map(LeafEntry::bytes))
         };
         self.fetch(windows.flat_map(ranges))
@@ -155,7 +156,7 @@ impl CoefficientFile {
         let of_tier = move |tier: u8| {
             let [first, last] = ends.map(|block| {
                 let id = BlockId::new(window, channel as u16, block as u32);
-                self.id_above(id, tier).block
+                self.metadata().above_in(id, tier).block
             });
             let leaves = self.reader.leaves_of(window, tier, channel as u16).iter();
             leaves.filter(move |leaf| leaf.first_block <= last && first < leaf.first_block + u32::from(leaf.count))
@@ -169,9 +170,14 @@ impl CoefficientFile {
     }
 
     /// Fetches the parts of some blocks that the coefficients marked by `wanted` need.
-    pub fn fetch_blocks(&self, codec: &WindowCodec, entries: &[BlockEntry], wanted: &[bool]) -> Result<()> {
+    pub fn fetch_blocks<'e>(
+        &self,
+        codec: &WindowCodec,
+        entries: impl IntoIterator<Item = &'e BlockEntry>,
+        wanted: &[bool],
+    ) -> Result<()> {
         let Some(mut prefetch) = Prefetch::new(self) else { return Ok(()) };
-        entries.iter().try_for_each(|entry| prefetch.add(codec, entry, wanted))?;
+        entries.into_iter().try_for_each(|entry| prefetch.add(codec, entry, wanted))?;
         prefetch.finish()
     }
 

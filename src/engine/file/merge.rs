@@ -429,9 +429,8 @@ impl<W: Write> Merger<'_, W> {
         lost: &mut BTreeSet<BlockId>,
         sums: &mut WindowEnd,
     ) -> Result<()> {
-        let (id, metadata) = (BlockId { window, ..entry.id }, file.metadata());
-        let begins_lost =
-            entry.begins_above(metadata.tiers(entry.id.window)) && lost.contains(&metadata.above(entry.id));
+        let id = BlockId { window, ..entry.id };
+        let begins_lost = entry.block_above(file.metadata()).is_some_and(|above| lost.contains(&above));
         let stored = if entry.lost || begins_lost { None } else { self.stored(file, entry)? };
         self.report.blocks += 1;
         match stored {

@@ -23,7 +23,9 @@ impl CoefficientFile {
         };
         let blocks = self.with_blocks_below(found.into_iter().flatten().collect())?;
         self.skipped = Some(Damage::new(blocks).into());
-        self.kept = self.kept.map(|kept| Arc::new(kept.emptied())); // damaged blocks must not be found without skipping
+        // What others keep knows nothing of the damage.
+        self.kept = self.kept.map(|kept| Arc::new(kept.emptied()));
+        self.above = Arc::new(self.above.emptied());
         Ok(self)
     }
 
@@ -35,8 +37,7 @@ impl CoefficientFile {
                 continue; // the leaf itself may be damaged
             }
             for entry in self.reader.leaf(leaf).map_err(|e| self.failed(e))? {
-                let wrong = damaged.get(&self.metadata().above(entry.id)).cloned();
-                let wrong = wrong.filter(|_| entry.begins_above(self.metadata().tiers(entry.id.window)));
+                let wrong = entry.block_above(self.metadata()).and_then(|above| damaged.get(&above).cloned());
                 wrong.into_iter().for_each(|wrong| _ = damaged.entry(entry.id).or_insert(wrong));
             }
         }

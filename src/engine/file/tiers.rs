@@ -2,8 +2,11 @@
 
 use super::above::{AboveKey, PlaceAbove, bytes_above, nodes_above, shared_bytes};
 use super::coefficient_file::CoefficientFile;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::memory::MOST_BLOCKS;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::{Above, Field};
@@ -11,28 +14,56 @@ use wavesplat_format::limits::BLOCKS_PER_LEAF;
 use wavesplat_format::{Axis, BlockEntry, BlockId};
 
 impl CoefficientFile {
-    /// The nodes of the block above that a block needs at the codec's level of detail, and the stored bytes read. None without
-    /// tiers above.
-    pub(super) fn above(&self, codec: &WindowCodec, id: BlockId, wanted: &[bool]) -> Result<(Option<Above>, u64)> {
-        let Some(above) = codec.above() else { return Ok((None, 0)) };
+    /// The nodes of the block above with which a block begins at the codec's level of detail. None without tiers above.
+    pub(super) fn above(&self, codec: &WindowCodec, id: BlockId, wanted: &[bool]) -> Result<Option<Above>> {
+        let Some(above) = codec.above() else { return Ok(None) };
         let place = PlaceAbove::new(self.metadata(), codec, &above, id);
-        let wanted = wanted_above(codec, wanted);
-        let (key, mut read) = (AboveKey { id: place.id, lod: above.lod, wanted: wanted.clone() }, 0);
-        let decode = || {
-            let (field, bytes) = self.decode_above(&above, place.id, &wanted)?;
-            read = bytes;
-            Ok(field)
-        };
-        let field = self.above.field(key, decode)?;
-        Ok((Some(place.cut(&field)), read))
+        let field = self.field(&above, place.id, wanted_above(codec, wanted))?;
+        Ok(Some(place.cut(&field)))
     }
 
-    /// The block of a tier in which a block lies.
-    pub(super) fn id_above(&self, mut id: BlockId, tier: u8) -> BlockId {
-        while id.tier < tier {
-            id = self.metadata().above(id);
+    /// Decodes what some blocks share, side by side, so that no thread waits for another later: as much as stays decoded.
+    pub fn decode_shared<'e>(
+        &self,
+        codec: &WindowCodec,
+        entries: impl IntoIterator<Item = &'e BlockEntry>,
+        wanted: &[bool],
+    ) -> Result<()> {
+        let Some(above) = codec.above() else { return Ok(()) };
+        let (metadata, wanted) = (self.metadata(), wanted_above(codec, wanted));
+        let begin = entries.into_iter().filter_map(|entry| entry.block_above(metadata));
+        let ids: BTreeSet<BlockId> = begin.map(|id| metadata.above_in(id, above.tier)).collect();
+        let ids: Vec<BlockId> = ids.into_iter().take(self.above.most()).collect();
+        ids.par_iter().try_for_each(|id| self.field(&above, *id, wanted.clone()).map(drop))
+    }
+
+    /// Some blocks of a window in groups of which all that they share stays decoded, with at most [`MOST_BLOCKS`] in each.
+    pub fn by_shared<'e>(&self, entries: impl IntoIterator<Item = &'e BlockEntry>) -> Vec<Vec<&'e BlockEntry>> {
+        let mut of_one: BTreeMap<BlockId, Vec<&BlockEntry>> = BTreeMap::new();
+        for entry in entries {
+            of_one.entry(entry.block_above(self.metadata()).unwrap_or(entry.id)).or_default().push(entry);
         }
-        id
+        let (mut groups, mut shared) = (vec![Vec::new()], 0);
+        for more in of_one.into_values() {
+            let last = &groups[groups.len() - 1];
+            if shared == self.above.most() || last.len() + more.len() > MOST_BLOCKS {
+                groups.push(Vec::new());
+                shared = 0;
+            }
+            groups.last_mut().into_iter().for_each(|group| group.extend(&more));
+            shared += 1;
+        }
+        groups
+    }
+
+    /// The decoded nodes of a block above others, kept or decoded now.
+    fn field(&self, codec: &WindowCodec, id: BlockId, wanted: Vec<bool>) -> Result<Arc<Field<'static>>> {
+        let key = AboveKey { id, lod: codec.lod, wanted };
+        self.above.field(&key, || {
+            let (entry, above) = (self.entry_above(id)?, self.above(codec, id, &key.wanted)?);
+            let block = Block::read(&self.reader, codec, &entry, self.all_voxels(&entry)?, &key.wanted, above);
+            Ok(Arc::new(block.map_err(|e| self.failed(e))?.refined(codec, &key.wanted)))
+        })
     }
 
     /// The entry of a block of a tier above 0.
@@ -43,15 +74,6 @@ impl CoefficientFile {
         };
         let entries = self.above.leaf(leaf.first(), || self.leaf(leaf))?;
         entries.get(number).cloned().ok_or_else(|| self.contradiction(format!("no {id}")))
-    }
-
-    /// Decodes a block of a tier above 0; also returns the stored bytes read.
-    fn decode_above(&self, codec: &WindowCodec, id: BlockId, wanted: &[bool]) -> Result<(Arc<Field<'static>>, u64)> {
-        let entry = self.entry_above(id)?;
-        let (above, bytes_above) = self.above(codec, id, wanted)?;
-        let block = Block::read(&self.reader, codec, &entry, self.all_voxels(&entry)?, wanted, above);
-        let block = block.map_err(|e| self.failed(e))?;
-        Ok((Arc::new(block.refined(codec, wanted)), block.bytes_read + bytes_above))
     }
 
     /// Keeps decoded blocks above others within their share of a memory budget, for this file and its clones. At first, the
@@ -65,8 +87,8 @@ impl CoefficientFile {
         shared_bytes(memory, bytes_above(self.metadata()))
     }
 
-    /// Bytes of memory, beside those of a block, for the nodes of the block above that lie in it, and to decode that, with
-    /// `each` bytes for a coefficient; 0 without tiers.
+    /// Extra bytes to decode a block in a file with tiers: its known nodes, and the block above while that is decoded, with `each`
+    /// bytes for a coefficient.
     pub(crate) fn bytes_to_begin(&self, each: usize) -> usize {
         let m = self.metadata();
         let longest = m.windows.iter().map(|window| window.coefficients as usize).max().unwrap_or(0);

@@ -14,7 +14,7 @@ use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::{WindowCodec, lane_groups, load_lanes};
 use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Lane;
-use wavesplat_format::{BlockEntry, BlockId, PartKind};
+use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartKind};
 
 /// The result of checking a file, with its source if one is given.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -25,8 +25,10 @@ pub struct VerifyReport {
     pub bytes: u64,
     /// Places where it is damaged, and blocks that were lost before it was recovered.
     pub damaged: u64,
-    /// Blocks that could not be checked, or not decoded, since what lists them or a block above is damaged.
+    /// Blocks that could not be checked, since what lists them is damaged.
     pub unchecked: u64,
+    /// Blocks that are stored intact and could not be decoded, since a block above them is damaged.
+    pub undecoded: u64,
     /// Descriptions of the first damage, at most [`MOST_NAMED`].
     pub damage: Vec<String>,
     /// The comparison of all intact blocks with the source.
@@ -154,65 +156,102 @@ pub fn verify(
     file.limit_shared(memory);
     let block = bytes_of_block(file, source.is_some());
     let at_once = blocks_within(memory, held, |memory| file.shared_bytes(memory), block, "verifying")?;
-    let mut report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
-    file.check_structure(&mut |wrong| report.damage(&wrong))?;
-    let (mut all, mut fetched) = (Comparison::default(), 0);
+    let mut check = Check::new(file, at_once);
+    file.check_structure(&mut |wrong| check.report.damage(&wrong))?;
     for window in 0..file.metadata().windows.len() as u32 {
-        let codec = file.codec(window)?;
         let range = file.window_range(window);
         let frames = source.as_mut().map(|s| s.window(range.start, range.len())).transpose()?;
         if let Some(frames) = frames.as_ref().filter(|f| f.frames() < range.len()) {
             let what = format!("ends after {} frames, {} were converted", range.start + frames.frames(), file.frames());
             return Err(Error::input(frames.name(0), what));
         }
-        let mut damaged = BTreeSet::new();
-        for leaf in file.leaves(window) {
-            if leaf.data_offset >= fetched {
-                fetched = file.fetch_on(leaf.data_offset)?;
-            }
-            let check = |entry: &BlockEntry| check_block(file, &codec, entry, frames.as_deref());
-            let entries = report.whole(file.leaf(leaf))?;
-            if entries.is_none() {
-                report.unchecked += u64::from(leaf.count);
-                damaged.extend(leaf.ids().filter(|id| id.tier > 0));
-            }
-            let entries = entries.unwrap_or_default();
-            let mut at = leaf.data_offset;
-            for entries in entries.chunks(at_once) {
-                file.fetch_whole(entries)?;
-                at = file.check_blocks(at, entries, &mut |wrong| report.damage(&wrong))?;
-                let (whole, below): (Vec<_>, Vec<_>) =
-                    entries.iter().partition(|entry| !begins_with_one_of(&damaged, file, entry));
-                report.blocks += whole.len() as u64;
-                for entry in below {
-                    report.unchecked +=
-                        u64::from(report.whole(file.reader.check_stored(entry).map_err(|e| file.failed(e)))?.is_some());
-                    damaged.extend(Some(entry.id).filter(|id| id.tier > 0));
-                }
-                for (entry, found) in whole.par_iter().map(|entry| (entry.id, check(entry))).collect::<Vec<_>>() {
-                    let found = report.whole(found)?;
-                    damaged.extend(Some(entry).filter(|id| id.tier > 0 && found.is_none()));
-                    all = found.map_or(all, |found| all.join(found));
-                }
-            }
-            file.check_leaf_end(leaf, &mut |wrong| report.damage(&wrong))?;
-            progress.advance(leaf.count.into());
-        }
+        check.window(window, frames.as_deref(), progress)?;
         frames.map_or(Ok(()), |frames| frames.check_unchanged())?;
     }
     file.check_unchanged()?;
     progress.finish();
-    if source.is_some() {
-        all.rms_error = (all.squares / all.samples.saturating_sub(all.missing).max(1) as f64).sqrt();
-        report.against = Some(all);
-    }
-    Ok(report)
+    Ok(check.finished(source.is_some()))
 }
 
-/// Whether a block begins with the nodes of one of some damaged blocks.
-fn begins_with_one_of(damaged: &BTreeSet<BlockId>, file: &CoefficientFile, entry: &BlockEntry) -> bool {
-    let metadata = file.metadata();
-    entry.begins_above(metadata.tiers(entry.id.window)) && damaged.contains(&metadata.above(entry.id))
+/// A check of a file, and what it has found so far.
+struct Check<'a> {
+    file: &'a CoefficientFile,
+    /// Blocks that are decoded together.
+    at_once: usize,
+    report: VerifyReport,
+    all: Comparison,
+    /// Blocks of the window above others that are damaged, or begin with the nodes of one that is.
+    damaged: BTreeSet<BlockId>,
+    /// The bytes of a remote file before this one were fetched.
+    fetched: u64,
+}
+
+impl<'a> Check<'a> {
+    fn new(file: &'a CoefficientFile, at_once: usize) -> Self {
+        let report = VerifyReport { bytes: file.bytes(), ..VerifyReport::default() };
+        Self { file, at_once, report, all: Comparison::default(), damaged: BTreeSet::new(), fetched: 0 }
+    }
+
+    fn window(&mut self, window: u32, source: Option<&dyn FrameWindow>, progress: &dyn Progress) -> Result<()> {
+        let codec = self.file.codec(window)?;
+        self.damaged.clear();
+        for leaf in self.file.leaves(window) {
+            let coarse = (leaf.tier > 0).then(|| codec.at(leaf.tier, 0));
+            self.leaf(leaf, coarse.as_ref().unwrap_or(&codec), source)?;
+            progress.advance(leaf.count.into());
+        }
+        Ok(())
+    }
+
+    fn leaf(&mut self, leaf: &LeafEntry, codec: &WindowCodec, source: Option<&dyn FrameWindow>) -> Result<()> {
+        if leaf.data_offset >= self.fetched {
+            self.fetched = self.file.fetch_on(leaf.data_offset)?;
+        }
+        let Some(entries) = self.report.whole(self.file.leaf(leaf))? else {
+            self.report.unchecked += u64::from(leaf.count);
+            self.damaged.extend(leaf.ids().filter(|id| id.tier > 0));
+            return self.file.check_leaf_end(leaf, &mut |wrong| self.report.damage(&wrong));
+        };
+        let mut at = leaf.data_offset;
+        for entries in entries.chunks(self.at_once) {
+            self.file.fetch_whole(entries)?;
+            at = self.file.check_blocks(at, entries, &mut |wrong| self.report.damage(&wrong))?;
+            self.blocks(entries, codec, source)?;
+        }
+        self.file.check_leaf_end(leaf, &mut |wrong| self.report.damage(&wrong))
+    }
+
+    /// Checks the parts of some blocks. Those that begin with damaged nodes are not decoded.
+    fn blocks(&mut self, entries: &[BlockEntry], codec: &WindowCodec, source: Option<&dyn FrameWindow>) -> Result<()> {
+        let file = self.file;
+        let begins_damaged =
+            |entry: &&BlockEntry| entry.block_above(file.metadata()).is_some_and(|above| self.damaged.contains(&above));
+        let (below, whole): (Vec<_>, Vec<_>) = entries.iter().partition(begins_damaged);
+        let stored = |entry: &&BlockEntry| file.reader.check_stored(entry).map_err(|e| file.failed(e));
+        for found in below.par_iter().map(stored).collect::<Vec<_>>() {
+            self.report.undecoded += u64::from(self.report.whole(found)?.is_some());
+        }
+        self.damaged.extend(below.iter().map(|entry| entry.id).filter(|id| id.tier > 0));
+        self.report.blocks += whole.len() as u64;
+        let wanted = vec![true; codec.basis.coefficients()];
+        for group in file.by_shared(whole) {
+            _ = file.decode_shared(codec, group.iter().copied(), &wanted); // damage to it was found before
+            let check = |entry: &&BlockEntry| check_block(file, codec, entry, source);
+            for (entry, found) in group.iter().zip(group.par_iter().map(check).collect::<Vec<_>>()) {
+                match self.report.whole(found)? {
+                    Some(found) => self.all = self.all.join(found),
+                    None => self.damaged.extend(Some(entry.id).filter(|id| id.tier > 0)),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finished(self, is_compared: bool) -> VerifyReport {
+        let Self { report, all, .. } = self;
+        let rms_error = (all.squares / all.samples.saturating_sub(all.missing).max(1) as f64).sqrt();
+        VerifyReport { against: is_compared.then_some(Comparison { rms_error, ..all }), ..report }
+    }
 }
 
 /// Bytes to check a block, and to compare it: the samples of the source, also before they became colours, and the
@@ -243,8 +282,6 @@ fn check_block(
     entry: &BlockEntry,
     source: Option<&dyn FrameWindow>,
 ) -> Result<Comparison> {
-    let coarse = (entry.id.tier > 0).then(|| codec.at(entry.id.tier, 0));
-    let codec = coarse.as_ref().unwrap_or(codec);
     let block = file.block(codec, entry, &vec![true; codec.basis.coefficients()])?;
     check_coefficients(file, entry, &block, codec)?;
     let Some(source) = source.filter(|_| entry.id.tier == 0) else { return Ok(Comparison::default()) };

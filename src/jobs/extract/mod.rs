@@ -16,6 +16,7 @@ use ahead::fetch_ahead;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::Write;
+use std::sync::{Mutex, PoisonError};
 use strides::{Strides, length};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
@@ -278,18 +279,25 @@ fn read_window(
 ) -> Result<()> {
     let InWindow { window, codec, frames, wanted } = InWindow::new(file, frames)?;
     let is_part = frames.len() < codec.frames() || target.region != file.grid.whole();
+    let out = Mutex::new(out);
+    let read = |entry: &BlockEntry| {
+        let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
+        let region = file.blocks.region(entry.id.block as usize);
+        let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
+        target.copy(&codec, &frames, &region, &samples, &mut out);
+        Ok(bytes_read)
+    };
     for entries in file.entries(window, channel, &target.region) {
-        for entries in entries?.chunks(at_once) {
-            file.fetch_blocks(&codec, entries, &wanted)?;
-            let decode = |entry: &BlockEntry| file.samples(&codec, entry, &wanted, is_part);
-            let decoded = entries.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
-            for (entry, (samples, bytes_read)) in entries.iter().zip(decoded) {
-                let region = file.blocks.region(entry.id.block as usize);
-                target.copy(&codec, &frames, &region, &samples, out);
-                report.blocks_read += 1;
-                report.bytes_read += bytes_read;
+        let entries = entries?;
+        for group in file.by_shared(&entries) {
+            file.fetch_blocks(&codec, group.iter().copied(), &wanted)?;
+            file.decode_shared(&codec, group.iter().copied(), &wanted)?;
+            let is_any = at_once >= rayon::current_num_threads(); // no more are decoded at once
+            for some in group.chunks(if is_any { group.len().max(1) } else { at_once }) {
+                report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
             }
         }
+        report.blocks_read += entries.len() as u64;
     }
     Ok(())
 }

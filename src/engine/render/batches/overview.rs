@@ -59,6 +59,8 @@ pub struct OverviewRequest<'a> {
     pub thinning: Thinning,
     /// Frame numbers, ascending. A scene may take frames near them instead.
     pub frames: &'a [usize],
+    /// Bytes of memory that blocks may share.
+    pub memory: usize,
     /// The blocks that are needed are those that touch this region of the volume. Voxels of others may be NaN.
     pub region: Region,
 }

@@ -18,6 +18,7 @@ use crate::render::report::LeftOut;
 use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
+use wavesplat_core::base::memory::MOST_BLOCKS;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{magnitude, rounding};
 use wavesplat_core::wavelet::Lane;
@@ -112,6 +113,7 @@ impl Scene for CoefficientScene {
     }
 
     fn overview(&mut self, request: &OverviewRequest<'_>, progress: &dyn Progress) -> Result<Option<Vec<f32>>> {
+        self.file.limit_shared(request.memory);
         overview::overview(&self.file, request, progress).map(Some)
     }
 
@@ -324,9 +326,16 @@ impl FrameBatch for CoefficientBatch<'_> {
     }
 
     fn fetch(&self, blocks: &[usize]) -> Result<()> {
-        let Some(mut prefetch) = Prefetch::new(self.file) else { return Ok(()) };
-        self.gather(blocks, &mut prefetch)?;
-        prefetch.finish()
+        if let Some(mut prefetch) = Prefetch::new(self.file) {
+            self.gather(blocks, &mut prefetch)?;
+            prefetch.finish()?;
+        }
+        let BatchPlan { codec, wanted, .. } = &self.plan;
+        if codec.tiers() == 0 {
+            return Ok(());
+        }
+        let next = blocks.iter().take(MOST_BLOCKS).map(|block| Ok(self.kept(*block)?.entry));
+        self.file.decode_shared(codec, &next.collect::<Result<Vec<_>>>()?, wanted)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

@@ -3,7 +3,6 @@
 use super::batch_plan::{SplatSource, error_planes};
 use crate::file::CoefficientFile;
 use crate::render::config::RenderConfig;
-use wavesplat_format::LeafEntry;
 
 /// Upper bounds for all windows of a file.
 pub(super) struct FileNeeds {
@@ -53,7 +52,7 @@ impl WindowKind {
     fn new(file: &CoefficientFile, what: SplatSource, window: u32) -> Self {
         let record = &file.metadata().windows[window as usize];
         let (missing, is_coded) = (file.has_missing(window), what == SplatSource::Coefficients);
-        let exact = leaves(file, window).any(|leaf| leaf.exact > 0);
+        let exact = file.leaves(window).iter().any(|leaf| leaf.exact > 0);
         Self {
             coefficients: if is_coded { record.coefficients as usize } else { 0 },
             parts: record.parts(),
@@ -63,14 +62,9 @@ impl WindowKind {
     }
 }
 
-/// The directory's leaves of a window, of all channels.
-fn leaves(file: &CoefficientFile, window: u32) -> impl Iterator<Item = &LeafEntry> {
-    (0..file.channels()).flat_map(move |channel| file.leaves_of(window, channel))
-}
-
 fn block_bytes(file: &CoefficientFile, is_missing: bool) -> usize {
     let windows = &file.metadata().windows;
-    let leaves = || (0..windows.len() as u32).flat_map(|window| leaves(file, window));
+    let leaves = || (0..windows.len() as u32).flat_map(|window| file.leaves(window));
     let is_double = windows.iter().filter_map(|w| w.pyramid.as_ref()).any(|pyramid| !pyramid.single);
     // Codes or nodes, and the values of all frames; what is stored exactly; a mask and corrections.
     let refined = if is_double { size_of::<f64>() } else { size_of::<f32>() } + size_of::<f64>();

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use wavesplat_core::base::grid::Grid;
 use wavesplat_core::base::sample::magnitude;
 use wavesplat_core::codec::WindowCodec;
-use wavesplat_format::{BlockEntry, PartEntry, PartKind};
+use wavesplat_format::{Basis, BlockEntry, BlockStats, PartEntry, PartKind};
 
 /// The parts of a block to read, and the errors of its samples.
 #[derive(Debug)]
@@ -46,6 +46,8 @@ pub(super) struct BlockSelector {
     /// The tiers above tier 0, and an upper bound of the coefficients that blocks begin with.
     tiers: u8,
     above: f64,
+    /// The largest sum of absolute terms of a series whose samples are at most 1; none if the functions are not orthonormal.
+    norm_of_ones: Option<f64>,
     frames: usize,
     pub(super) rule: Rule,
 }
@@ -140,7 +142,12 @@ impl BlockSelector {
         let alike = codec.sides_alike().into_iter().map(|side| alike(config, grid, side)).collect();
         let (energy_gain, frames) = (codec.energy_gains(), codec.frames());
         let (tiers, rule) = (codec.tiers(), Rule::Nothing);
-        Self { gains, largest_gain, energy_gain, alike, cumulative, tiers, above, frames, rule }
+        let norm_of_ones = match codec.scheme.basis {
+            Basis::Samples => Some(1.0),
+            Basis::Haar | Basis::Learned => Some((frames as f64).sqrt()),
+            Basis::Multi => None,
+        };
+        Self { gains, largest_gain, energy_gain, alike, cumulative, tiers, above, norm_of_ones, frames, rule }
     }
 
     /// The parts of a block to read: all but those that the rule leaves out. If zeros are within the limit, only the
@@ -275,14 +282,30 @@ impl BlockSelector {
         entry.parts.is_empty() && !entry.begins_above(self.tiers)
     }
 
-    /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block.
+    /// An upper bound of the sum of absolute terms c_k u_k(t) of any sample of a block: from the changes that its parts cause, or
+    /// from its samples.
     pub(super) fn absolute_sum(&self, entry: &BlockEntry) -> f64 {
         let levels = levels(entry).into_iter();
         let each = levels.map(|part| part.entry.stats.largest * self.largest_gain[part.level]);
+        let changes = if self.cumulative { each.fold(0.0, f64::max) } else { each.sum() };
         let of_above = if entry.begins_above(self.tiers) { self.above * self.largest_gain[0] } else { 0.0 };
-        of_above + if self.cumulative { each.fold(0.0, f64::max) } else { each.sum() }
+        changes + self.bound_by_samples(entry).map_or(of_above, |bound| bound.min(of_above))
+    }
+
+    /// The same for whole blocks whose samples are all decoded from coefficients: with orthonormal functions, the sum is at most the
+    /// norm of the series.
+    fn bound_by_samples(&self, entry: &BlockEntry) -> Option<f64> {
+        let stored = [PartKind::Outliers, PartKind::Missing, PartKind::Exact];
+        let is_decoded = stored.iter().all(|kind| entry.part(*kind).is_none());
+        let BlockStats { min, max, reached, .. } = entry.stats;
+        // Neither what is splatted nor the source is farther from the stored range than the error.
+        let largest = magnitude((min, max)) + 2.0 * reached;
+        self.norm_of_ones.filter(|_| is_decoded && min <= max).map(|norm| norm * largest * ORTHONORMAL)
     }
 }
+
+/// A factor for the rounding of functions that are orthonormal but for it.
+const ORTHONORMAL: f64 = 1.0 + 1e-9;
 
 /// The price of going from one step to the next.
 fn price(from: &Step, to: &Step) -> Cost {

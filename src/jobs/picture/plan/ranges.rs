@@ -66,7 +66,7 @@ pub(in crate::picture) fn distribution_of_frames(
         thinning.stride *= 2;
     }
     let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
-    let request = OverviewRequest { thinning, frames, region };
+    let request = OverviewRequest { thinning, frames, memory: small.memory, region };
     let samples = scene.overview(&request, reporter.progress("overview", "steps").as_ref())?;
     Ok(samples.map(Distribution::new))
 }
@@ -164,7 +164,7 @@ fn values_of_overview(
     }
     let frames = spread(scene, frames_of(voxels(&thinning), small));
     let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
-    let request = OverviewRequest { thinning, frames: &frames, region };
+    let request = OverviewRequest { thinning, frames: &frames, memory: small.memory, region };
     let Some(overview) = scene.overview(&request, reporter.progress("overview", "steps").as_ref())? else {
         return Ok(None);
     };
