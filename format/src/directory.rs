@@ -67,7 +67,7 @@ impl BlockEntry {
         begins_above(self.id, self.stats, self.is_exact(), tiers)
     }
 
-    /// The block with whose nodes it begins, if it does.
+    /// The block above whose nodes it begins with, if any.
     pub fn block_above(&self, metadata: &Metadata) -> Option<BlockId> {
         self.begins_above(metadata.tiers(self.id.window)).then(|| metadata.above(self.id))
     }

@@ -310,7 +310,7 @@ impl Metadata {
         tiers.map(|tier| u64::from(self.blocks_per_channel(tier))).sum::<u64>() * u64::from(self.channels)
     }
 
-    /// The block of the next tier whose box has that of a block.
+    /// The block of the next tier, whose box contains the block's box.
     pub fn above(&self, id: BlockId) -> BlockId {
         let tier = id.tier.saturating_add(1);
         let ([nx, ny, _], [of_x, of_y, _]) = (self.blocks_per_axis(id.tier), self.blocks_per_axis(tier));
@@ -319,7 +319,7 @@ impl Metadata {
         BlockId { block: (x + of_x * (y + of_y * z)) as u32, tier, ..id }
     }
 
-    /// The block of a tier whose box has that of a block.
+    /// The block of a tier whose box contains a block's box.
     pub fn above_in(&self, mut id: BlockId, tier: u8) -> BlockId {
         while id.tier < tier {
             id = self.above(id);

@@ -124,7 +124,7 @@ fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
         text += &format!("  {} more blocks could not be checked: their directory is damaged\n", r.unchecked);
     }
     if r.undecoded > 0 {
-        text += &format!("  {} more blocks could not be decoded: a block above them is damaged\n", r.undecoded);
+        text += &format!("  {} more blocks could not be decoded, because blocks above them are damaged\n", r.undecoded);
     }
     let shown = r.damage.len().min(MOST_SHOWN);
     r.damage[..shown].iter().for_each(|damage| text += &format!("  {damage}\n"));

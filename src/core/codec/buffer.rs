@@ -3,9 +3,9 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
-/// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. So the pool never
-/// holds more memory than buffers of its sizes had at one time. Only blocks use buffers, so none is much larger than others
-/// of its kind.
+/// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. A buffer takes
+/// a spare one of at most twice its length, so the pool holds no more than buffers of each size and its half had at one time. Only
+/// blocks use buffers, so their sizes are few.
 #[derive(Debug, Default)]
 pub struct Buffer<T: Pooled> {
     /// At least `len` values; the rest has been used before.
@@ -14,8 +14,8 @@ pub struct Buffer<T: Pooled> {
 }
 
 impl<T: Pooled> Buffer<T> {
-    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and not twice as
-    /// long, or a new one.
+    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and at most twice
+    /// as long, or a new one.
     pub fn with_len(len: usize) -> Self {
         let mut spare = spare::<T>();
         let fits =
@@ -114,10 +114,13 @@ mod tests {
         let (small, large) = (Buffer::with_len(1 << 8), Buffer::with_len(1 << 12));
         let memory = [address(&small), address(&large)];
         drop((small, large));
-        let again = Buffer::with_len(1 << 10);
-        assert_eq!((address(&again), again.len()), (memory[1], 1 << 10));
-        let small = Buffer::with_len(3);
-        assert_eq!((address(&small), small.len()), (memory[0], 3));
+        let again = Buffer::with_len(1 << 11);
+        assert_eq!((address(&again), again.len()), (memory[1], 1 << 11));
+        let small = Buffer::with_len(1 << 7);
+        assert_eq!((address(&small), small.len()), (memory[0], 1 << 7));
+        drop((again, small));
+        let few = Buffer::with_len(3);
+        assert!(few.len() == 3 && !memory.contains(&address(&few)), "much larger ones are left to others");
         assert_eq!(Buffer::<u64>::with_len(1 << 14).len(), 1 << 14);
     }
 }

@@ -113,10 +113,12 @@ impl Encoder {
         let coded = match pyramid.single {
             true => {
                 let known = above.map(Above::singles);
+                self.double = Default::default(); // an earlier window may have used it
                 source.refine(pyramid, size, &source, known, &mut self.single, &mut self.codes)
             }
             false => {
                 let known = above.map(Above::doubles);
+                self.single = Default::default();
                 source.refine(pyramid, size, &source, known, &mut self.double, &mut self.codes)
             }
         };

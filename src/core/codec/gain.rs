@@ -28,7 +28,7 @@ impl WindowCodec {
             Stencil::Cubic => 1.25,
             Stencil::Linear => 1.0,
         };
-        let along_time = if pyramid.order.contains(&Axis::T) { 2_u64 << self.tier } else { 1 }; // at most one pass a level
+        let along_time = if pyramid.order.contains(&Axis::T) { 2_u64 << self.tier } else { 1 }; // each level has at most one pass along time
         in_space * in_space * in_space * along_time as f64
     }
 

@@ -44,7 +44,7 @@ impl Checked {
         self.listed.count().saturating_add(outliers.saturating_mul(CODES_PER_OUTLIER))
     }
 
-    /// Whether outliers take a large share of the bytes of a block with so many samples, and of the samples.
+    /// Whether outliers take a large share of the bytes, and are more than a few of the block's samples.
     fn has_many_outliers(&self, samples: usize) -> bool {
         let is_large =
             |outliers: usize| outliers * CODES_PER_OUTLIER > self.listed.count() && outliers > samples / FEW_OUTLIERS;
@@ -102,13 +102,15 @@ impl Source<'_> {
         let finest = step / self.codec.scheme.coarseness.max(1.0);
         while checked.has_many_outliers(self.missing.mask.len()) && step > finest {
             let finer = (step / FINER).max(finest);
-            encode(finer, field, codes)?;
-            let found = check(field, codes);
-            if checked.cost() <= found.cost() {
-                encode(step, field, codes)?; // finer steps leave the errors of known nodes
-                break;
+            let found = encode(finer, field, codes).map(|()| check(field, codes));
+            let is_worse = |found: &Checked| found.tally.is_some() && checked.cost() <= found.cost();
+            match found {
+                Some(found) if !is_worse(&found) => (step, checked) = (finer, found),
+                _ => {
+                    encode(step, field, codes)?; // finer steps leave the errors of known nodes
+                    break;
+                }
             }
-            (step, checked) = (finer, found);
         }
         let Checked { listed, tally } = checked;
         let mut tally = tally?;
@@ -313,8 +315,8 @@ const SAMPLING: usize = 3;
 /// than a sample of an exact block.
 const MOST_OUTLIERS: usize = 8;
 
-/// Finer steps are tried if more than one sample in this many misses the bound: fewer take little, and each step takes as long as
-/// coding the block.
+/// Finer steps are tried if more than one sample in this many misses the bound. Fewer cost few bytes, and each try takes as long
+/// as coding the block.
 const FEW_OUTLIERS: usize = 512;
 
 /// A finer step is tried if fewer codes than this come with an outlier. An outlier takes as many bytes as about eight.

@@ -21,7 +21,7 @@ pub(super) struct CoarseBlocks {
 }
 
 impl CoarseBlocks {
-    /// No blocks yet. Decoded ones, of so many bytes each, take up to their share of the memory.
+    /// No blocks yet. Decoded blocks take `bytes` each, together at most their share of the memory.
     pub(super) fn new(memory: usize, bytes: usize) -> Self {
         Self { coded: Mutex::default(), decoded: AboveBlocks::within(memory, bytes) }
     }
@@ -34,7 +34,8 @@ impl CoarseBlocks {
         Ok(())
     }
 
-    /// Decodes what some blocks share, side by side, so that no thread waits for another later; as much as stays decoded.
+    /// Decodes in parallel the blocks above that some blocks share, as many as stay decoded. Otherwise threads would wait for each
+    /// other.
     pub(super) fn decode_shared(
         &self,
         plan: &Plan<'_>,

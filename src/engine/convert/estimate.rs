@@ -81,7 +81,7 @@ pub fn estimates(
     let is_rough = source_archive.grid.whole().voxels().saturating_mul(frames) > FEW_SAMPLES;
     let all = plan.blocks.len().saturating_mul(frames.div_ceil(first.config.window));
     let most = if is_rough { blocks_of_window(all, windows.len() * configs.len()) } else { BLOCKS };
-    let most = if plan.tiers > 0 { (most / 2).max(LEAST_BLOCKS) } else { most }; // and those above
+    let most = if plan.tiers > 0 { (most / 2).max(LEAST_BLOCKS) } else { most }; // the blocks above are coded, too
     let blocks = some_blocks(&plan.blocks, most);
     progress.start(Some((windows.len() * configs.len()) as u64));
     let read = FramesRead {

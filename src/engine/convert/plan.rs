@@ -27,7 +27,7 @@ pub(super) struct Plan<'a> {
     batch_of_singles: usize,
     /// The same for 64-bit floats.
     batch_of_doubles: usize,
-    /// The tiers above the blocks: the least number for which the last has one block, at most [`MAX_TIERS`]. 0 without pyramids, or if
+    /// The tiers above the blocks: the fewest for which the last tier has one block, at most [`MAX_TIERS`]. 0 without pyramids, or if
     /// blocks cannot be halved.
     pub(super) tiers: u8,
 }
@@ -257,7 +257,7 @@ fn batch_len(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> R
     let shared = |batch: usize, memory: usize| {
         let in_work = threads(batch) * above;
         let spool = 2 * SPOOLED; // vectors grow to twice their length
-        if above > 0 { spool + shared_bytes(memory, above).max(in_work) } else { 0 }
+        if above > 0 { spool + shared_bytes(memory, above) + in_work } else { 0 }
     };
     let needs = |batch: usize| batch * 4 * raw + threads(batch) * scratch + choice + memory::FIXED;
     // recent memory is cached

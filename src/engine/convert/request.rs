@@ -46,7 +46,7 @@ pub struct ConvertRequest {
     /// Prediction in space: none (for haar, multi and learned), linear, cubic or auto. Default: what suits the basis.
     #[serde(with = "choice::optional")]
     pub space: Option<SpatialPredictor>,
-    /// Frames in a window. Default: 32, up to 512 for at most 256 voxels; one more for the basis multi.
+    /// Frames in a window. Default: 32, up to 1024 for at most 256 voxels; one more for the basis multi.
     pub window: Option<usize>,
     /// Voxels a side of a block. Default: as many as suit the window.
     pub block: Option<usize>,
@@ -173,7 +173,7 @@ impl ConvertRequest {
     /// The default window: longer for a few series, which are small and predict each other little.
     fn usual_window(&self, usual: usize, grid: Grid) -> usize {
         let is_short = |window: &usize| window.saturating_mul(grid.whole().voxels()) <= FEW_SAMPLES;
-        let window = [512, 256, 128, 64].into_iter().find(is_short).unwrap_or(usual);
+        let window = [1024, 512, 256, 128, 64].into_iter().find(is_short).unwrap_or(usual);
         window + usize::from(self.basis == Some(Basis::Multi))
     }
 
@@ -247,7 +247,9 @@ mod tests {
     fn windows_of_few_voxels_are_long() {
         let multi = ConvertRequest { basis: Some(Basis::Multi), ..ConvertRequest::default() };
         let grid = |dims| Grid { dims, spacing: [1.0; 3], origin: [0.0; 3] };
-        for (dims, frames) in [([2, 2, 2], 512), ([4, 4, 4], 256), ([16, 16, 1], 64), ([16, 17, 1], 32)] {
+        for (dims, frames) in
+            [([2, 2, 2], 1024), ([4, 4, 2], 512), ([4, 4, 4], 256), ([16, 16, 1], 64), ([16, 17, 1], 32)]
+        {
             assert_eq!(ConvertRequest::default().usual_window(32, grid(dims)), frames, "{dims:?}");
             assert_eq!(multi.usual_window(32, grid(dims)), frames + 1, "{dims:?}");
         }

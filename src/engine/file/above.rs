@@ -50,7 +50,7 @@ impl AboveBlocks {
         self.most.load(Relaxed)
     }
 
-    /// As many, without any yet.
+    /// An empty one with the same limit.
     pub(super) fn emptied(&self) -> Self {
         Self { most: AtomicUsize::new(self.most()), kept: Mutex::default(), leaves: Mutex::default() }
     }
@@ -90,12 +90,12 @@ impl AboveBlocks {
             return Ok(field.clone());
         }
         let field = decoded.insert(decode()?).clone();
-        self.slot(key, Some(&slot)); // is used later than those above it
+        self.slot(key, Some(&slot)); // it is needed longer than its own blocks above
         Ok(field)
     }
 
-    /// The place of a decoded block, which becomes the most recently used one: the known place, or that in which it was decoded, or a
-    /// new one. The least recently used blocks make room.
+    /// The place of a decoded block, which becomes the most recently used one: the place in the list, else `decoded`, else a new one.
+    /// The least recently used blocks make room.
     fn slot(&self, key: &AboveKey, decoded: Option<&Slot>) -> Slot {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = kept.iter().position(|(of, _)| of == key).map(|at| kept.remove(at).1);

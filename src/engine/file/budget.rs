@@ -4,7 +4,7 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::memory::{FIXED, MOST_BLOCKS, least};
 
 /// The number of blocks of `block` bytes each that fit in `memory`, beside those that all of them share, and the `held`
-/// bytes of a source. `shared(memory)` is the bytes that all blocks share under the budget `memory`. A source takes a share of the memory.
+/// bytes of a source. `shared(memory)` is how many bytes all blocks share with a budget of `memory`. A source takes a share of the memory.
 ///
 /// # Errors
 /// Not even one fits; `doing` names the work.

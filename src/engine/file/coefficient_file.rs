@@ -43,10 +43,10 @@ pub struct CoefficientFile {
     colour_transform: Option<ColourTransform>,
     /// Damaged blocks that are taken for missing samples, if they are.
     pub(super) skipped: Option<Arc<Damage>>,
+    /// Decoded blocks of tiers above 0. They are dropped before `kept`, which returns the memory of all to the system.
+    pub(super) above: Arc<AboveBlocks>,
     /// Decoded blocks that are kept, if there is room for some.
     pub(super) kept: Option<Arc<DecodedBlocks>>,
-    /// Decoded blocks of tiers above 0.
-    pub(super) above: Arc<AboveBlocks>,
 }
 
 impl CoefficientFile {

@@ -100,6 +100,11 @@ impl DecodedBlocks {
         !seen.insert((id, lod))
     }
 
+    /// Whether something of a block is kept. This is no use of it.
+    pub(super) fn has(&self, key: &DecodedKey) -> bool {
+        self.kept().entries.contains_key(key)
+    }
+
     /// The coefficients of a block, if they are kept.
     pub(super) fn block(&self, key: &DecodedKey) -> Option<Arc<DecodedBlock>> {
         match self.kept().get(key)? {

@@ -121,7 +121,7 @@ impl CoefficientFile {
         channel: usize,
         region: &Region,
     ) -> Result<()> {
-        let is_part = *region != self.grid.whole(); // otherwise it comes with the blocks
+        let is_part = *region != self.grid.whole(); // a whole volume fetches it with its blocks
         let ranges = |window| {
             let above = self.leaves_above(window, channel, region).map(LeafEntry::bytes);
             let coarse = self.coarse_bytes(window).filter(|bytes| is_part && bytes.end - bytes.start <= FEW_BYTES);

@@ -42,9 +42,7 @@ impl CoefficientFile {
             Ok(Arc::new(DecodedBlock { block, field }))
         };
         let Some(kept) = self.kept.as_ref().filter(|_| is_field_needed) else { return decode() };
-        let parts = entry.parts.iter().map(|part| part.kind).collect();
-        let (wanted_ks, begins_above) = (wanted.to_vec(), entry.begins_above(codec.tiers()));
-        let key = self.key(entry, DecodedForm::Coefficients { wanted: wanted_ks, parts, begins_above });
+        let key = self.key_of_coefficients(codec, entry, wanted);
         if let Some(block) = kept.block(&key) {
             return Ok(block);
         }
@@ -79,6 +77,22 @@ impl CoefficientFile {
         let (samples, bytes_read) = decode(&vec![true; wanted.len()])?;
         kept.keep_samples(key, &samples);
         Ok((samples, bytes_read))
+    }
+
+    /// Whether the samples of a block are kept.
+    pub fn keeps_samples(&self, entry: &BlockEntry) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key(entry, DecodedForm::Samples)))
+    }
+
+    /// Whether the coefficients of a block are kept.
+    pub(crate) fn keeps_coefficients(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key_of_coefficients(codec, entry, wanted)))
+    }
+
+    fn key_of_coefficients(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> DecodedKey {
+        let parts = entry.parts.iter().map(|part| part.kind).collect();
+        let (wanted, begins_above) = (wanted.to_vec(), entry.begins_above(codec.tiers()));
+        self.key(entry, DecodedForm::Coefficients { wanted, parts, begins_above })
     }
 
     fn key(&self, entry: &BlockEntry, form: DecodedForm) -> DecodedKey {

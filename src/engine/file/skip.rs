@@ -23,7 +23,7 @@ impl CoefficientFile {
         };
         let blocks = self.with_blocks_below(found.into_iter().flatten().collect())?;
         self.skipped = Some(Damage::new(blocks).into());
-        // What others keep knows nothing of the damage.
+        // Blocks kept so far were decoded without knowing the damage.
         self.kept = self.kept.map(|kept| Arc::new(kept.emptied()));
         self.above = Arc::new(self.above.emptied());
         Ok(self)

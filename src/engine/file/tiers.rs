@@ -3,7 +3,7 @@
 use super::above::{AboveKey, PlaceAbove, bytes_above, nodes_above, shared_bytes};
 use super::coefficient_file::CoefficientFile;
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::memory::MOST_BLOCKS;
@@ -22,7 +22,8 @@ impl CoefficientFile {
         Ok(Some(place.cut(&field)))
     }
 
-    /// Decodes what some blocks share, side by side, so that no thread waits for another later: as much as stays decoded.
+    /// Decodes in parallel the blocks above that some blocks share, as many as stay decoded. Otherwise threads would wait for each
+    /// other.
     pub fn decode_shared<'e>(
         &self,
         codec: &WindowCodec,
@@ -33,27 +34,45 @@ impl CoefficientFile {
         let (metadata, wanted) = (self.metadata(), wanted_above(codec, wanted));
         let begin = entries.into_iter().filter_map(|entry| entry.block_above(metadata));
         let ids: BTreeSet<BlockId> = begin.map(|id| metadata.above_in(id, above.tier)).collect();
-        let ids: Vec<BlockId> = ids.into_iter().take(self.above.most()).collect();
+        let mut needed = BTreeSet::new();
+        let stays = |id: &BlockId| {
+            needed.extend(self.with_blocks_above(*id));
+            needed.len() <= self.above.most()
+        };
+        let ids: Vec<BlockId> = ids.into_iter().take_while(stays).collect();
         ids.par_iter().try_for_each(|id| self.field(&above, *id, wanted.clone()).map(drop))
     }
 
-    /// Some blocks of a window in groups of which all that they share stays decoded, with at most [`MOST_BLOCKS`] in each.
+    /// Some blocks of a window in groups whose blocks above all stay decoded, if one of them does. Groups have at most [`MOST_BLOCKS`]
+    /// blocks and, but for single blocks, 16 MiB of stored bytes.
     pub fn by_shared<'e>(&self, entries: impl IntoIterator<Item = &'e BlockEntry>) -> Vec<Vec<&'e BlockEntry>> {
-        let mut of_one: BTreeMap<BlockId, Vec<&BlockEntry>> = BTreeMap::new();
-        for entry in entries {
-            of_one.entry(entry.block_above(self.metadata()).unwrap_or(entry.id)).or_default().push(entry);
-        }
-        let (mut groups, mut shared) = (vec![Vec::new()], 0);
-        for more in of_one.into_values() {
-            let last = &groups[groups.len() - 1];
-            if shared == self.above.most() || last.len() + more.len() > MOST_BLOCKS {
+        let above = |entry: &BlockEntry| entry.block_above(self.metadata());
+        let mut sorted: Vec<&BlockEntry> = entries.into_iter().collect();
+        sorted.sort_by_key(|entry| (above(entry).is_none(), above(entry).unwrap_or(entry.id)));
+        let (mut groups, mut needed, mut stored) = (vec![Vec::new()], BTreeSet::new(), 0);
+        for entry in sorted {
+            let more = above(entry).map_or(BTreeSet::new(), |id| self.with_blocks_above(id).collect());
+            let count = needed.union(&more).count();
+            let last: &Vec<&BlockEntry> = &groups[groups.len() - 1];
+            let is_full = count > self.above.most() && count > needed.len()
+                || last.len() == MOST_BLOCKS
+                || stored + entry.stored_len() > STORED_TOGETHER;
+            if is_full && !last.is_empty() {
                 groups.push(Vec::new());
-                shared = 0;
+                (needed, stored) = (BTreeSet::new(), 0);
             }
-            groups.last_mut().into_iter().for_each(|group| group.extend(&more));
-            shared += 1;
+            needed.extend(more);
+            stored += entry.stored_len();
+            groups.last_mut().into_iter().for_each(|group| group.push(entry));
         }
         groups
+    }
+
+    /// A block, and those above it.
+    fn with_blocks_above(&self, id: BlockId) -> impl Iterator<Item = BlockId> + '_ {
+        let metadata = self.metadata();
+        let tiers = metadata.tiers(id.window);
+        std::iter::successors(Some(id), move |id| (id.tier < tiers).then(|| metadata.above(*id)))
     }
 
     /// The decoded nodes of a block above others, kept or decoded now.
@@ -118,6 +137,9 @@ impl CoefficientFile {
         Ok(largest * codec.prediction_gain())
     }
 }
+
+/// Stored bytes of blocks that are read together: fewer than a remote file fetches at a time.
+const STORED_TOGETHER: u64 = 16 << 20;
 
 /// The coefficients of a block above that those of a block need. If time is refined, all.
 pub(super) fn wanted_above(codec: &WindowCodec, wanted: &[bool]) -> Vec<bool> {

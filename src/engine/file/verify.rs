@@ -234,14 +234,17 @@ impl<'a> Check<'a> {
         self.damaged.extend(below.iter().map(|entry| entry.id).filter(|id| id.tier > 0));
         self.report.blocks += whole.len() as u64;
         let wanted = vec![true; codec.basis.coefficients()];
+        let mut checked = Vec::new();
         for group in file.by_shared(whole) {
-            _ = file.decode_shared(codec, group.iter().copied(), &wanted); // damage to it was found before
-            let check = |entry: &&BlockEntry| check_block(file, codec, entry, source);
-            for (entry, found) in group.iter().zip(group.par_iter().map(check).collect::<Vec<_>>()) {
-                match self.report.whole(found)? {
-                    Some(found) => self.all = self.all.join(found),
-                    None => self.damaged.extend(Some(entry.id).filter(|id| id.tier > 0)),
-                }
+            _ = file.decode_shared(codec, group.iter().copied(), &wanted); // damaged blocks above were reported before
+            let check = |entry: &&BlockEntry| (entry.id, check_block(file, codec, entry, source));
+            checked.extend(group.par_iter().map(check).collect::<Vec<_>>());
+        }
+        checked.sort_by_key(|(id, _)| *id); // so that nothing depends on the groups
+        for (id, found) in checked {
+            match self.report.whole(found)? {
+                Some(found) => self.all = self.all.join(found),
+                None => self.damaged.extend(Some(id).filter(|id| id.tier > 0)),
             }
         }
         Ok(())

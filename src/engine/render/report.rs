@@ -57,7 +57,7 @@ pub struct RenderReport {
     pub expected_error: f64,
     /// The largest error bound of any pixel, if pictures are certified.
     pub certified_error: Option<f64>,
-    /// Stored bytes of blocks that were read.
+    /// Stored bytes of blocks that were read, without those of the tiers above them.
     pub bytes_read: u64,
     /// The largest number of bytes that a projection planned to use, of [`RenderConfig::memory`](super::RenderConfig).
     pub planned_bytes: u64,

@@ -71,7 +71,7 @@ pub struct ExtractReport {
     pub frames: usize,
     /// Decoded blocks; a block decoded twice counts twice.
     pub blocks_read: u64,
-    /// Stored bytes of blocks that were read.
+    /// Stored bytes of blocks that were read, without those of the tiers above them.
     pub bytes_read: u64,
     /// Bytes that were read of the file, including its directory.
     pub file_bytes_read: u64,
@@ -291,8 +291,9 @@ fn read_window(
         let entries = entries?;
         for group in file.by_shared(&entries) {
             file.fetch_blocks(&codec, group.iter().copied(), &wanted)?;
-            file.decode_shared(&codec, group.iter().copied(), &wanted)?;
-            let is_any = at_once >= rayon::current_num_threads(); // no more are decoded at once
+            let decoded_now = group.iter().copied().filter(|entry| !file.keeps_samples(entry));
+            file.decode_shared(&codec, decoded_now, &wanted)?;
+            let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
             for some in group.chunks(if is_any { group.len().max(1) } else { at_once }) {
                 report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
             }

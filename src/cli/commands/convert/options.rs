@@ -109,7 +109,7 @@ pub(crate) struct ConvertArgs {
     /// Prediction of coefficients in space [default: none for haar and multi, else auto]
     #[arg(long, value_parser = choice::<SpatialPredictor>(), help_heading = CODING)]
     space: Option<SpatialPredictor>,
-    /// Frames in a window: a power of two for haar, one more for multi [default: 32; up to 512 for 256 voxels or less]
+    /// Frames in a window: a power of two for haar, one more for multi [default: 32; up to 1024 for 256 voxels or less]
     #[arg(long, value_name = "T", help_heading = CODING)]
     window: Option<usize>,
     /// Block edge in voxels [default: up to 48, up to 32 without a pyramid; more for thin volumes, less for long windows]

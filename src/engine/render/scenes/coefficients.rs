@@ -331,11 +331,12 @@ impl FrameBatch for CoefficientBatch<'_> {
             prefetch.finish()?;
         }
         let BatchPlan { codec, wanted, .. } = &self.plan;
-        if codec.tiers() == 0 {
-            return Ok(());
+        if codec.tiers() == 0 || blocks.len() > MOST_BLOCKS {
+            return Ok(()); // some of them are asked for next
         }
-        let next = blocks.iter().take(MOST_BLOCKS).map(|block| Ok(self.kept(*block)?.entry));
-        self.file.decode_shared(codec, &next.collect::<Result<Vec<_>>>()?, wanted)
+        let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;
+        let decoded_now = next.iter().filter(|entry| !self.file.keeps_coefficients(codec, entry, wanted));
+        self.file.decode_shared(codec, decoded_now, wanted)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {

@@ -292,8 +292,8 @@ impl BlockSelector {
         changes + self.bound_by_samples(entry).map_or(of_above, |bound| bound.min(of_above))
     }
 
-    /// The same for whole blocks whose samples are all decoded from coefficients: with orthonormal functions, the sum is at most the
-    /// norm of the series.
+    /// As [`Self::absolute_sum`], from the samples, for blocks without outliers, missing or exact samples: with orthonormal functions,
+    /// the sum is at most the norm of the series.
     fn bound_by_samples(&self, entry: &BlockEntry) -> Option<f64> {
         let stored = [PartKind::Outliers, PartKind::Missing, PartKind::Exact];
         let is_decoded = stored.iter().all(|kind| entry.part(*kind).is_none());
@@ -304,7 +304,7 @@ impl BlockSelector {
     }
 }
 
-/// A factor for the rounding of functions that are orthonormal but for it.
+/// Allows for functions that are orthonormal only up to rounding.
 const ORTHONORMAL: f64 = 1.0 + 1e-9;
 
 /// The price of going from one step to the next.
