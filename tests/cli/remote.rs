@@ -80,7 +80,8 @@ fn few_requests_bring_little_more_than_is_needed() {
 
     work.remote(&server, "$RENDER URL --size 64x48 --range 0,1 -o f_%02d.png").ok();
     let (requests, sent) = server.traffic();
-    assert!(requests <= 12 && sent <= bytes().len() + (128 << 10), "a view: {requests} requests, {sent} bytes");
+    // pages of directories that lie between blocks come twice, in fewer requests
+    assert!(requests <= 8 && sent <= bytes().len() + (256 << 10), "a view: {requests} requests, {sent} bytes");
 }
 
 #[test]
