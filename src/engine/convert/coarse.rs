@@ -21,9 +21,9 @@ pub(super) struct CoarseBlocks {
 }
 
 impl CoarseBlocks {
-    /// No blocks yet. Decoded blocks take `bytes` each, together at most their share of the memory.
-    pub(super) fn new(memory: usize, bytes: usize) -> Self {
-        Self { coded: Mutex::default(), decoded: AboveBlocks::within(memory, bytes) }
+    /// No blocks yet, and room for so many decoded ones.
+    pub(super) fn new(decoded: usize) -> Self {
+        Self { coded: Mutex::default(), decoded: AboveBlocks::new(decoded) }
     }
 
     /// Adds a coded block and its decoded nodes.

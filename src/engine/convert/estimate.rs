@@ -252,7 +252,7 @@ impl BlocksCoded<'_> {
         job: &Arc<WindowJob>,
     ) -> Result<f64> {
         let (ids, mut bytes, mut voxels) = (self.ids(job.index, tier), 0.0, 0);
-        for ids in ids.chunks(self.plan.batch(&job.codec)) {
+        for ids in ids.chunks(self.plan.room(&job.codec).batch) {
             let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
             let batch = Batch { window: job.clone(), blocks, last: false };
             for Encoded { block, .. } in

@@ -255,7 +255,7 @@ impl<'a> WindowReader<'a> {
         let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        let coarse = CoarseBlocks::new(self.config.memory, self.plan.bytes_above(&codec));
+        let coarse = CoarseBlocks::new(self.plan.room(&codec).kept_above);
         let (features, digest) = (self.features, scan.digest);
         Ok(WindowJob { index, first_frame, id, features, codec, coarse, range, digest, times })
     }
@@ -359,7 +359,9 @@ impl<'a> WindowReader<'a> {
         };
         let tiers = (0..=job.codec.tiers()).rev();
         tiers
-            .flat_map(|tier| of_tier(tier).chunks(plan.batch(&job.codec)).map(<[BlockId]>::to_vec).collect::<Vec<_>>())
+            .flat_map(|tier| {
+                of_tier(tier).chunks(plan.room(&job.codec).batch).map(<[BlockId]>::to_vec).collect::<Vec<_>>()
+            })
             .collect()
     }
 

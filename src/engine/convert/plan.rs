@@ -2,7 +2,7 @@
 
 use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
-use crate::file::above::shared_bytes;
+use crate::file::above::blocks_within;
 use crate::file::promise::UNIT_RANGE;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::{BlockGrid, Region};
@@ -23,13 +23,22 @@ pub(super) struct Plan<'a> {
     /// The metadata before the first frame.
     pub(super) start: Metadata,
     pub(super) blocks: BlockGrid,
-    /// Blocks that are gathered, encoded and written together, if their coefficients are coded in 32-bit floats.
-    batch_of_singles: usize,
-    /// The same for 64-bit floats.
-    batch_of_doubles: usize,
+    /// For windows whose coefficients are coded in 32-bit floats.
+    of_singles: Room,
+    /// For windows whose coefficients are coded in 64-bit floats.
+    of_doubles: Room,
     /// The tiers above the blocks: the fewest for which the last tier has one block, at most [`MAX_TIERS`]. 0 without pyramids, or if
     /// blocks cannot be halved.
     pub(super) tiers: u8,
+}
+
+/// The numbers of blocks that memory has room for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    /// Blocks that are gathered, encoded and written together.
+    pub(super) batch: usize,
+    /// Blocks above others that stay decoded.
+    pub(super) kept_above: usize,
 }
 
 /// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
@@ -126,27 +135,16 @@ impl<'a> Plan<'a> {
             ));
         }
         let tiers = if config.has_pyramids() { tiers(blocks) } else { 0 };
-        let batch_of_doubles = batch_len(input, blocks, tiers, size_of::<f64>())?;
-        let batch_of_singles = batch_len(input, blocks, tiers, size_of::<f32>())?;
+        let of_doubles = room(input, blocks, tiers, size_of::<f64>())?;
+        let of_singles = room(input, blocks, tiers, size_of::<f32>())?;
         let start = start(input, edge);
-        Ok(Self {
-            start,
-            colour_transform: colour_transform.as_ref(),
-            blocks,
-            batch_of_singles,
-            batch_of_doubles,
-            tiers,
-        })
+        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, of_singles, of_doubles, tiers })
     }
 
-    /// The number of blocks that are gathered, encoded and written together.
-    pub(super) fn batch(&self, codec: &WindowCodec) -> usize {
-        if bytes_of_coefficient(codec) == size_of::<f32>() { self.batch_of_singles } else { self.batch_of_doubles }
-    }
-
-    /// Bytes of the decoded nodes of a block above others.
-    pub(super) fn bytes_above(&self, codec: &WindowCodec) -> usize {
-        bytes_above(self.blocks, codec.basis.coefficients(), bytes_of_coefficient(codec))
+    /// The numbers of blocks that memory has room for in a window.
+    pub(super) fn room(&self, codec: &WindowCodec) -> Room {
+        let is_single = codec.scheme.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
+        if is_single { self.of_singles } else { self.of_doubles }
     }
 
     pub(super) fn channels(&self) -> usize {
@@ -180,12 +178,6 @@ fn tiers(blocks: BlockGrid) -> u8 {
 fn bytes_above(blocks: BlockGrid, coefficients: usize, each: usize) -> usize {
     let nodes: usize = blocks.region(0).dims().iter().map(|n| n + 1).product();
     nodes * coefficients * each
-}
-
-/// Bytes of a coefficient that a window's pyramid refines.
-fn bytes_of_coefficient(codec: &WindowCodec) -> usize {
-    let is_single = codec.scheme.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
-    if is_single { size_of::<f32>() } else { size_of::<f64>() }
 }
 
 /// Checks that the tolerance or error is valid for this bound and these samples.
@@ -236,9 +228,9 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
     }
 }
 
-/// The number of blocks in a batch that fit in memory. Memory holds two batches of samples and two of coded blocks, the
-/// workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
-fn batch_len(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result<usize> {
+/// The numbers of blocks that fit in memory. Memory holds two batches of samples and two of coded blocks, the workers' scratch, and
+/// what choosing the next window's scheme takes. A coefficient takes `each` bytes.
+fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result<Room> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
     let voxels = blocks.region(0).voxels();
@@ -253,23 +245,21 @@ fn batch_len(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> R
     let choice = if has_pyramids { choose::bytes(samples, sample) } else { 0 };
     let threads = |batch: usize| batch.min(rayon::current_num_threads());
     let begin = above / 4; // the nodes that lie in a block, of which each has one part in eight, and more at faces
-    let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + ZSTD_SCRATCH;
-    let shared = |batch: usize, memory: usize| {
-        let in_work = threads(batch) * above;
-        let spool = 2 * SPOOLED; // vectors grow to twice their length
-        if above > 0 { spool + shared_bytes(memory, above) + in_work } else { 0 }
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + above + ZSTD_SCRATCH;
+    let spool = if tiers > 0 { 2 * SPOOLED } else { 0 }; // vectors grow to twice their length
+    let needs = |Room { batch, kept_above }: &Room| {
+        batch * 4 * raw + threads(*batch) * scratch + kept_above * above + spool + choice + memory::FIXED
     };
-    let needs = |batch: usize| batch * 4 * raw + threads(batch) * scratch + choice + memory::FIXED;
     // recent memory is cached
     let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS);
-    let all = |batch: usize, memory: usize| needs(batch) + shared(batch, memory);
-    let fits = (1..=enough).rev().find(|batch| all(*batch, config.memory) + archive.memory <= config.memory);
-    fits.ok_or_else(|| {
+    let fits = |room: &Room| needs(room) + archive.memory <= config.memory;
+    let largest = |kept_above| (1..=enough).rev().map(|batch| Room { batch, kept_above }).find(fits);
+    // More threads save more than blocks that stay decoded.
+    let rooms = [1, blocks_within(config.memory, above)].into_iter().filter_map(largest);
+    rooms.max_by_key(|room| threads(room.batch)).ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
-        let scaled = |needs: usize| needs as f64 * share;
-        let (least, edge) = (memory::least(|memory| scaled(all(1, memory)) as usize), blocks.edges[0]);
-        let least = least.div_ceil(MIB);
-        let window = config.window;
+        let least = (needs(&Room { batch: 1, kept_above: 1 }) as f64 * share / MIB).ceil();
+        let (window, edge) = (config.window, blocks.edges[0]);
         let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
         Error::setting(
             "memory",
@@ -292,7 +282,7 @@ pub(super) const SPOOLED: usize = 1 << 18;
 
 /// An upper bound of the memory of a zstd context at the offered levels, for inputs of a few MiB.
 const ZSTD_SCRATCH: usize = 4 << 20;
-const MIB: usize = 1 << 20;
+const MIB: f64 = 1_048_576.0;
 
 #[cfg(test)]
 mod tests {

@@ -42,7 +42,12 @@ const SHARE: usize = 8;
 impl AboveBlocks {
     /// Room for the blocks of `bytes` bytes each that fit in their share of a memory budget; at least one.
     pub(crate) fn within(memory: usize, bytes: usize) -> Self {
-        Self { most: AtomicUsize::new(blocks_within(memory, bytes)), kept: Mutex::default(), leaves: Mutex::default() }
+        Self::new(blocks_within(memory, bytes))
+    }
+
+    /// Room for so many blocks.
+    pub(crate) fn new(most: usize) -> Self {
+        Self { most: AtomicUsize::new(most), kept: Mutex::default(), leaves: Mutex::default() }
     }
 
     /// The largest number of blocks that stay decoded.
@@ -52,7 +57,7 @@ impl AboveBlocks {
 
     /// An empty one with the same limit.
     pub(super) fn emptied(&self) -> Self {
-        Self { most: AtomicUsize::new(self.most()), kept: Mutex::default(), leaves: Mutex::default() }
+        Self::new(self.most())
     }
 
     /// Changes the memory budget of which they take a share.
@@ -108,13 +113,13 @@ impl AboveBlocks {
 }
 
 /// The number of blocks of `bytes` bytes each in their share of a memory budget.
-fn blocks_within(memory: usize, bytes: usize) -> usize {
+pub(crate) fn blocks_within(memory: usize, bytes: usize) -> usize {
     let room = memory.saturating_sub(FIXED) / SHARE;
     (room / bytes.max(1)).clamp(1, MOST)
 }
 
 /// Bytes of the blocks of `bytes` bytes each in their share of a memory budget.
-pub(crate) fn shared_bytes(memory: usize, bytes: usize) -> usize {
+pub(super) fn shared_bytes(memory: usize, bytes: usize) -> usize {
     blocks_within(memory, bytes) * bytes
 }
 
