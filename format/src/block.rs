@@ -1,6 +1,6 @@
 //! Blocks and their parts before they are written, and the compressor that makes a part.
 
-use crate::directory::{BLOCK_ENTRY, PART_ENTRY, begins_above};
+use crate::directory::{begins_above, entry_len};
 use crate::limits::{MAX_PART_RAW, align};
 use crate::section::{FRAME, decompress};
 use crate::{Error, Metadata, Result};
@@ -185,7 +185,7 @@ impl EncodedBlock {
 
     /// Bytes of its entry: once in the block, and once more in a leaf of the directory before that is compressed.
     pub fn entry_len(&self) -> u64 {
-        (BLOCK_ENTRY + PART_ENTRY * self.parts.len()) as u64
+        entry_len(self.parts.len()) as u64
     }
 }
 

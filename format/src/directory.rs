@@ -11,7 +11,7 @@ use crate::{Metadata, Result, Storage};
 pub(crate) const BLOCK_ENTRY: usize = 64;
 
 /// Bytes of a part's entry.
-pub(crate) const PART_ENTRY: usize = 56;
+const PART_ENTRY: usize = 56;
 
 /// A part's entry in the directory: position, checksum and statistics.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ impl BlockEntry {
 
     /// Bytes of its header in the file, frame included.
     pub(crate) fn header_len(&self) -> u64 {
-        (FRAME + BLOCK_ENTRY + PART_ENTRY * self.parts.len()) as u64
+        (FRAME + entry_len(self.parts.len())) as u64
     }
 
     pub(crate) fn encode(&self, out: &mut Vec<u8>) {
@@ -156,6 +156,11 @@ impl BlockEntry {
         }
         Ok(align(at))
     }
+}
+
+/// Bytes of a block's entry with so many parts.
+pub(crate) fn entry_len(parts: usize) -> usize {
+    BLOCK_ENTRY + PART_ENTRY * parts
 }
 
 /// As [`BlockEntry::begins_above`].

@@ -90,8 +90,8 @@ impl Header {
     /// The header of a new file with these features.
     pub(crate) fn new(id: FileId, features: Features) -> Self {
         let (required, version) = (features.bits(), features.version());
-        let first = if required < TIERED { required.trailing_zeros() } else { TIERED.trailing_zeros() };
-        let needs = REQUIRED.get(first as usize).copied().unwrap_or_default();
+        let told = if features.tiered { TIERED } else { required };
+        let needs = REQUIRED.get(told.trailing_zeros() as usize).copied().unwrap_or_default();
         Self { version, required, optional: 0, id, needs: needs.into() }
     }
 

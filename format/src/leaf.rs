@@ -2,7 +2,7 @@
 
 use crate::block::{BlockId, PartKind};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
-use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
+use crate::directory::{BLOCK_ENTRY, BlockEntry, entry_len};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_PARTS, align};
 use crate::metadata::Metadata;
 use crate::section::{SectionExtent, section_end};
@@ -112,7 +112,7 @@ impl LeafEntry {
 
     /// Upper bound on the bytes of its blocks' entries.
     pub(crate) fn max_raw_len(&self) -> usize {
-        usize::from(self.count) * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)
+        usize::from(self.count) * entry_len(MAX_PARTS)
     }
 
     /// Parses the entries of its blocks, in order, from its decompressed bytes. Does not check their offsets and values.

@@ -2,7 +2,7 @@
 
 use crate::block::BlockId;
 use crate::bytes::{FieldReader, ensure};
-use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY};
+use crate::directory::{BlockEntry, entry_len};
 use crate::file_id::FileId;
 use crate::header::{Features, HEADER};
 use crate::leaf::{LeafEntry, check_window, leaves_of};
@@ -178,7 +178,7 @@ pub(crate) fn block_at(
     offset: u64,
 ) -> Result<(BlockEntry, u64)> {
     let section = SectionId::Block(id);
-    let (_, bytes) = plain_at(storage, file, section, offset, BLOCK_ENTRY + PART_ENTRY * MAX_PARTS)?;
+    let (_, bytes) = plain_at(storage, file, section, offset, entry_len(MAX_PARTS))?;
     let mut fields = FieldReader::new(&bytes);
     let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
         fields.end()?;

@@ -4,7 +4,7 @@
 use crate::block::{BlockId, EncodedBlock, EncodedPart};
 use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::description::Description;
-use crate::directory::{BLOCK_ENTRY, BlockEntry, PART_ENTRY, PartEntry};
+use crate::directory::{BlockEntry, PartEntry, entry_len};
 use crate::file_id::FileId;
 use crate::footer::FOOTER;
 use crate::header::Features;
@@ -364,8 +364,8 @@ fn claimed_len(storage: &impl Storage, tag: &[u8; 4], at: u64) -> u64 {
 /// Upper bound on the stored bytes of a section.
 fn max_stored(tag: &[u8; 4]) -> usize {
     match tag {
-        b"BLCK" => BLOCK_ENTRY + PART_ENTRY * MAX_PARTS,
-        b"LEAF" => BLOCKS_PER_LEAF as usize * (BLOCK_ENTRY + PART_ENTRY * MAX_PARTS),
+        b"BLCK" => entry_len(MAX_PARTS),
+        b"LEAF" => BLOCKS_PER_LEAF as usize * entry_len(MAX_PARTS),
         b"WEND" => WINDOW_END,
         _ => MAX_METADATA,
     }

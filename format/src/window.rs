@@ -116,6 +116,14 @@ pub struct WindowEnd {
 /// Bytes of the record of a window's end.
 pub(crate) const WINDOW_END: usize = 4 + 8 * 8;
 
+impl Window {
+    /// Bytes of a decoded coefficient: 32-bit floats if a pyramid refines them, otherwise 64-bit floats.
+    pub fn coefficient_size(&self) -> usize {
+        let is_single = self.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
+        if is_single { size_of::<f32>() } else { size_of::<f64>() }
+    }
+}
+
 impl WindowRecord {
     /// Bytes that a window takes in a file beside its blocks and leaves: its section and its end, and both in the metadata.
     ///

@@ -1,6 +1,6 @@
 //! Files of colours in the programs: reports, refusals and resuming.
 
-use super::{Archive, Run, Work, floats, npy, read_npy};
+use super::{Archive, Run, Work, floats, npy, places_of, read_npy};
 
 /// Writes an archive `a.npy` with values beyond the colour map's, and a transfer function `a.csv`.
 fn work() -> (Work, Archive) {
@@ -224,7 +224,7 @@ fn damaged_channels_are_named_left_out_and_recovered() {
     let (work, _) = with_file("--block 8 --window 8");
     let file = work.read("a.wspl");
     let mut bad = file.clone();
-    let blocks: Vec<usize> = file.windows(4).enumerate().filter(|(_, w)| w == b"BLCK").map(|(at, _)| at).collect();
+    let blocks = places_of(&file, b"BLCK");
     let above = 2 + 1; // in every channel
     assert_eq!(blocks.len(), 5 * 3 * (above + 3 * 2 * 2));
     let lost = 3 * above + 12 + 5; // in the first window's second channel

@@ -143,6 +143,11 @@ impl Work {
     }
 }
 
+/// The places of all sections of a file with a tag.
+fn places_of(file: &[u8], tag: &[u8; 4]) -> Vec<usize> {
+    file.windows(4).enumerate().filter(|(_, bytes)| bytes == tag).map(|(at, _)| at).collect()
+}
+
 /// What a coefficient file says of itself, but for the options that it remembers, and the id and size that depend on them.
 fn all_but_options(work: &Work, file: &str) -> serde_json::Value {
     let mut info = work.wavesplat(&format!("info {file} --json")).ok().json();

@@ -1,6 +1,6 @@
 //! Partial sums of pictures: the sum of all parts is the picture, and parts of other pictures are refused.
 
-use super::{Archive, Run, Work, floats, read_npy};
+use super::{Archive, Run, Work, floats, places_of, read_npy};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use wavesplat::base::progress::Silent;
@@ -392,7 +392,7 @@ fn sums_report_the_damage_that_a_part_left_out() {
     work.write("a.npy", Archive::smooth([20, 14, 10], 16).npy());
     work.wavesplat("convert a.npy -o a.wspl --window 8 --block 8").ok();
     let mut bytes = work.read("a.wspl");
-    let blocks: Vec<usize> = bytes.windows(4).enumerate().filter(|(_, w)| w == b"BLCK").map(|(at, _)| at).collect();
+    let blocks = places_of(&bytes, b"BLCK");
     let largest = blocks.windows(2).max_by_key(|ends| ends[1] - ends[0]).unwrap();
     bytes[largest[0].midpoint(largest[1])] ^= 1;
     work.write("a.wspl", &bytes);

@@ -1,6 +1,6 @@
 //! Recovery of damaged files: intact blocks are recovered and shown; lost blocks are named and never shown as data.
 
-use super::{Archive, Work, floats, read_npy};
+use super::{Archive, Work, floats, places_of, read_npy};
 
 /// Five windows of eight frames, in 24 blocks each.
 fn work() -> (Work, Vec<u8>) {
@@ -12,7 +12,7 @@ fn work() -> (Work, Vec<u8>) {
 }
 
 fn of_place(file: &[u8], tag: &[u8; 4], number: usize) -> usize {
-    file.windows(4).enumerate().filter(|(_, bytes)| bytes == tag).nth(number).unwrap().0
+    places_of(file, tag)[number]
 }
 
 /// Blocks of a window that lie above those of all voxels, and all.

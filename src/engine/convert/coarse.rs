@@ -4,7 +4,7 @@ use super::Plan;
 use super::plan::SPOOLED;
 use crate::file::above::{AboveBlocks, AboveKey, PlaceAbove};
 use rayon::prelude::*;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, PoisonError};
 use tempfile::{SpooledTempFile, spooled_tempfile};
@@ -43,7 +43,7 @@ impl CoarseBlocks {
         ids: impl Iterator<Item = BlockId>,
     ) -> Result<()> {
         let above = ids.filter(|id| id.tier < codec.tiers()).map(|id| plan.start.above(id));
-        let above: Vec<BlockId> = above.collect::<BTreeSet<_>>().into_iter().take(self.decoded.most()).collect();
+        let above = self.decoded.staying(&plan.start, codec.tiers(), above.collect());
         above.par_iter().try_for_each(|id| self.field(plan, &codec.at(id.tier, 0), *id).map(drop))
     }
 

@@ -358,11 +358,8 @@ impl<'a> WindowReader<'a> {
             (0..plan.channels() as u16).flat_map(of_channel).collect()
         };
         let tiers = (0..=job.codec.tiers()).rev();
-        tiers
-            .flat_map(|tier| {
-                of_tier(tier).chunks(plan.room(&job.codec).batch).map(<[BlockId]>::to_vec).collect::<Vec<_>>()
-            })
-            .collect()
+        let batch = plan.room(&job.codec).batch;
+        tiers.flat_map(|tier| of_tier(tier).chunks(batch).map(<[BlockId]>::to_vec).collect::<Vec<_>>()).collect()
     }
 
     /// Reads the samples that coding one block takes, frame by frame.

@@ -178,9 +178,7 @@ impl ConvertConfig {
     pub fn with_max_error(max_error: f64) -> Self {
         Self { max_error: Some(max_error), ..Self::new(0.0) }
     }
-}
 
-impl ConvertConfig {
     /// Whether windows may have pyramids.
     fn has_pyramids(&self) -> bool {
         self.coding.space != SpatialPredictor::Alone && self.tolerance > 0.0

@@ -2,7 +2,7 @@
 
 use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
-use crate::file::above::blocks_within;
+use crate::file::above::{most_within, nodes_above};
 use crate::file::promise::UNIT_RANGE;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::{BlockGrid, Region};
@@ -174,12 +174,6 @@ fn tiers(blocks: BlockGrid) -> u8 {
     if is_even { tiers } else { 0 }
 }
 
-/// Bytes of the decoded nodes of a block above others, with `each` bytes for a coefficient.
-fn bytes_above(blocks: BlockGrid, coefficients: usize, each: usize) -> usize {
-    let nodes: usize = blocks.region(0).dims().iter().map(|n| n + 1).product();
-    nodes * coefficients * each
-}
-
 /// Checks that the tolerance or error is valid for this bound and these samples.
 fn check_bound(input: &CodedInput) -> Result<()> {
     let config = &input.config;
@@ -241,10 +235,10 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let codes = voxels * most_coefficients(config) * size_of::<i32>();
     let has_pyramids = config.has_pyramids();
     let field = if has_pyramids { 2 * voxels * most_coefficients(config) * each } else { 0 };
-    let above = if tiers > 0 { bytes_above(blocks, most_coefficients(config), each) } else { 0 };
+    let above = if tiers > 0 { nodes_above(blocks) * most_coefficients(config) * each } else { 0 };
     let choice = if has_pyramids { choose::bytes(samples, sample) } else { 0 };
     let threads = |batch: usize| batch.min(rayon::current_num_threads());
-    let begin = above / 4; // the nodes that lie in a block, of which each has one part in eight, and more at faces
+    let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
     let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + above + ZSTD_SCRATCH;
     let spool = if tiers > 0 { 2 * SPOOLED } else { 0 }; // vectors grow to twice their length
     let needs = |Room { batch, kept_above }: &Room| {
@@ -255,7 +249,7 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let fits = |room: &Room| needs(room) + archive.memory <= config.memory;
     let largest = |kept_above| (1..=enough).rev().map(|batch| Room { batch, kept_above }).find(fits);
     // More threads save more than blocks that stay decoded.
-    let rooms = [1, blocks_within(config.memory, above)].into_iter().filter_map(largest);
+    let rooms = [1, most_within(config.memory, above)].into_iter().filter_map(largest);
     rooms.max_by_key(|room| threads(room.batch)).ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
         let least = (needs(&Room { batch: 1, kept_above: 1 }) as f64 * share / MIB).ceil();

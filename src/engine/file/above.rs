@@ -1,10 +1,11 @@
 //! The blocks above others, decoded: many blocks share what is coarse.
 
 use super::detail;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::memory::FIXED;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::field::{Above, Field};
@@ -42,7 +43,7 @@ const SHARE: usize = 8;
 impl AboveBlocks {
     /// Room for the blocks of `bytes` bytes each that fit in their share of a memory budget; at least one.
     pub(crate) fn within(memory: usize, bytes: usize) -> Self {
-        Self::new(blocks_within(memory, bytes))
+        Self::new(most_within(memory, bytes))
     }
 
     /// Room for so many blocks.
@@ -60,9 +61,20 @@ impl AboveBlocks {
         Self::new(self.most())
     }
 
-    /// Changes the memory budget of which they take a share.
+    /// Sets the limit to the blocks of `bytes` bytes each that fit in their share of another memory budget.
     pub(super) fn limit(&self, memory: usize, bytes: usize) {
-        self.most.store(blocks_within(memory, bytes), Relaxed);
+        self.most.store(most_within(memory, bytes), Relaxed);
+    }
+
+    /// The first of some blocks that stay decoded together with those above them; at least one. Their window has so many tiers.
+    pub(crate) fn staying(&self, file: &Metadata, tiers: u8, blocks: BTreeSet<BlockId>) -> Vec<BlockId> {
+        let mut needed = BTreeSet::new();
+        let stays = |id: &BlockId| {
+            let is_first = needed.is_empty();
+            needed.extend(with_blocks_above(file, tiers, *id));
+            is_first || needed.len() <= self.most()
+        };
+        blocks.into_iter().take_while(stays).collect()
     }
 
     /// The entries of a leaf.
@@ -113,18 +125,18 @@ impl AboveBlocks {
 }
 
 /// The number of blocks of `bytes` bytes each in their share of a memory budget.
-pub(crate) fn blocks_within(memory: usize, bytes: usize) -> usize {
+pub(crate) fn most_within(memory: usize, bytes: usize) -> usize {
     let room = memory.saturating_sub(FIXED) / SHARE;
     (room / bytes.max(1)).clamp(1, MOST)
 }
 
-/// Bytes of the blocks of `bytes` bytes each in their share of a memory budget.
-pub(super) fn shared_bytes(memory: usize, bytes: usize) -> usize {
-    blocks_within(memory, bytes) * bytes
-}
-
 /// More blocks would take longer to search than they save.
 const MOST: usize = 1024;
+
+/// A block of a window with so many tiers, and those above it.
+pub(super) fn with_blocks_above(file: &Metadata, tiers: u8, id: BlockId) -> impl Iterator<Item = BlockId> + '_ {
+    std::iter::successors(Some(id), move |id| (id.tier < tiers).then(|| file.above(*id)))
+}
 
 /// Where the nodes lie that a block begins with.
 pub(crate) struct PlaceAbove {
@@ -157,16 +169,12 @@ impl PlaceAbove {
 
 /// Bytes of the decoded nodes of a block above others; 0 without tiers.
 pub(super) fn bytes_above(m: &Metadata) -> usize {
-    let bytes = |window: &Window| {
-        let is_single = window.pyramid.as_ref().is_some_and(|pyramid| pyramid.single);
-        window.coefficients as usize * if is_single { size_of::<f32>() } else { size_of::<f64>() }
-    };
+    let bytes = |window: &Window| window.coefficients as usize * window.coefficient_size();
     let tiered = m.windows.iter().filter(|window| window.tiers() > 0);
-    nodes_above(m) * tiered.map(bytes).max().unwrap_or(0)
+    nodes_above(detail::whole(m).1) * tiered.map(bytes).max().unwrap_or(0)
 }
 
-/// The most nodes of a block above others, ghost nodes included.
-pub(super) fn nodes_above(m: &Metadata) -> usize {
-    let (_, blocks) = detail::whole(m);
+/// The most nodes of a block above these, ghost nodes included.
+pub(crate) fn nodes_above(blocks: BlockGrid) -> usize {
     blocks.region(0).dims().iter().map(|n| n + 1).product()
 }

@@ -22,7 +22,7 @@ use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::coarse;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
-use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage};
+use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage, Window};
 
 /// An open coefficient file; several threads may read it. Clones share what is open.
 #[derive(Debug, Clone)]
@@ -236,8 +236,8 @@ impl CoefficientFile {
     /// and exactly stored samples.
     pub fn block_bytes(&self) -> usize {
         let payload = 5;
-        let is_double = self.metadata().windows.iter().any(|w| w.pyramid.as_ref().is_none_or(|p| !p.single));
-        let refined = payload + size_of::<i32>() + if is_double { size_of::<f64>() } else { size_of::<f32>() };
+        let coefficient = self.metadata().windows.iter().map(Window::coefficient_size).max().unwrap_or(0);
+        let refined = payload + size_of::<i32>() + coefficient;
         self.largest_block() * (refined + 1 + self.sample().size()) + self.bytes_to_begin(refined)
     }
 

@@ -1,7 +1,8 @@
 //! Blocks of files with tiers: they begin with the decoded nodes of the block above.
 
-use super::above::{AboveKey, PlaceAbove, bytes_above, nodes_above, shared_bytes};
+use super::above::{AboveKey, PlaceAbove, bytes_above, most_within, nodes_above, with_blocks_above};
 use super::coefficient_file::CoefficientFile;
+use super::detail;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -34,12 +35,7 @@ impl CoefficientFile {
         let (metadata, wanted) = (self.metadata(), wanted_above(codec, wanted));
         let begin = entries.into_iter().filter_map(|entry| entry.block_above(metadata));
         let ids: BTreeSet<BlockId> = begin.map(|id| metadata.above_in(id, above.tier)).collect();
-        let mut needed = BTreeSet::new();
-        let stays = |id: &BlockId| {
-            needed.extend(self.with_blocks_above(*id));
-            needed.len() <= self.above.most()
-        };
-        let ids: Vec<BlockId> = ids.into_iter().take_while(stays).collect();
+        let ids = self.above.staying(metadata, codec.tiers(), ids);
         ids.par_iter().try_for_each(|id| self.field(&above, *id, wanted.clone()).map(drop))
     }
 
@@ -49,30 +45,26 @@ impl CoefficientFile {
         let above = |entry: &BlockEntry| entry.block_above(self.metadata());
         let mut sorted: Vec<&BlockEntry> = entries.into_iter().collect();
         sorted.sort_by_key(|entry| (above(entry).is_none(), above(entry).unwrap_or(entry.id)));
-        let (mut groups, mut needed, mut stored) = (vec![Vec::new()], BTreeSet::new(), 0);
+        let needs = |id: BlockId| with_blocks_above(self.metadata(), self.metadata().tiers(id.window), id);
+        let mut groups: Vec<Vec<&BlockEntry>> = Vec::new();
+        let (mut needed, mut stored) = (BTreeSet::new(), 0);
         for entry in sorted {
-            let more = above(entry).map_or(BTreeSet::new(), |id| self.with_blocks_above(id).collect());
+            let more: BTreeSet<BlockId> = above(entry).into_iter().flat_map(needs).collect();
             let count = needed.union(&more).count();
-            let last: &Vec<&BlockEntry> = &groups[groups.len() - 1];
             let is_full = count > self.above.most() && count > needed.len()
-                || last.len() == MOST_BLOCKS
+                || groups.last().is_some_and(|group| group.len() == MOST_BLOCKS)
                 || stored + entry.stored_len() > STORED_TOGETHER;
-            if is_full && !last.is_empty() {
-                groups.push(Vec::new());
-                (needed, stored) = (BTreeSet::new(), 0);
+            match groups.last_mut().filter(|_| !is_full) {
+                Some(group) => group.push(entry),
+                None => {
+                    groups.push(vec![entry]);
+                    (needed, stored) = (BTreeSet::new(), 0);
+                }
             }
             needed.extend(more);
             stored += entry.stored_len();
-            groups.last_mut().into_iter().for_each(|group| group.push(entry));
         }
         groups
-    }
-
-    /// A block, and those above it.
-    fn with_blocks_above(&self, id: BlockId) -> impl Iterator<Item = BlockId> + '_ {
-        let metadata = self.metadata();
-        let tiers = metadata.tiers(id.window);
-        std::iter::successors(Some(id), move |id| (id.tier < tiers).then(|| metadata.above(*id)))
     }
 
     /// The decoded nodes of a block above others, kept or decoded now.
@@ -103,7 +95,8 @@ impl CoefficientFile {
 
     /// Bytes of the decoded blocks above others within their share of a memory budget.
     pub fn shared_bytes(&self, memory: usize) -> usize {
-        shared_bytes(memory, bytes_above(self.metadata()))
+        let each = bytes_above(self.metadata());
+        most_within(memory, each) * each
     }
 
     /// Extra bytes to decode a block in a file with tiers: its known nodes, and the block above while that is decoded, with `each`
@@ -111,7 +104,7 @@ impl CoefficientFile {
     pub(crate) fn bytes_to_begin(&self, each: usize) -> usize {
         let m = self.metadata();
         let longest = m.windows.iter().map(|window| window.coefficients as usize).max().unwrap_or(0);
-        let (own, above) = (self.largest_block(), nodes_above(m) * longest);
+        let (own, above) = (self.largest_block(), nodes_above(detail::whole(m).1) * longest);
         let known = if self.lod > 0 {
             own
         } else {

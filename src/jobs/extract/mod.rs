@@ -294,7 +294,7 @@ fn read_window(
             let decoded_now = group.iter().copied().filter(|entry| !file.keeps_samples(entry));
             file.decode_shared(&codec, decoded_now, &wanted)?;
             let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
-            for some in group.chunks(if is_any { group.len().max(1) } else { at_once }) {
+            for some in group.chunks(if is_any { group.len() } else { at_once }) {
                 report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
             }
         }
