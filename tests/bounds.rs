@@ -16,6 +16,7 @@ use wavesplat::convert::{Basis, Bound};
 use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
 use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::decode::WantedFrames;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Case {
@@ -164,7 +165,7 @@ impl Trial {
                     assert!(places.iter().all(|i| self.missing[*i] || self.found[*i] == self.source[*i]));
                     continue;
                 }
-                block.for_each_run(&codec, |at, values| {
+                block.for_each_run(&codec, &WantedFrames::all(&codec), |at, values| {
                     places[at..].iter().zip(values).for_each(|(i, v)| found[*i] = *v);
                 });
                 let outliers = numbers(codec.sample, &block.outliers.samples);

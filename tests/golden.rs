@@ -98,6 +98,15 @@ fn features() -> Vec<(String, SampleType, Kind, Mask, ConvertConfig)> {
     add_tiered("missing", 4, Kind::Mixed, Mask::Special, over_time.clone());
     add_tiered("zeros", 2, Kind::Flash, Mask::None, over_time);
     add_tiered("double", 4, Kind::Wave, Mask::None, pyramid(Basis::Haar, Stencil::Linear, 1e-7));
+    // Version 1.2: listed values.
+    found.push(("listed-labels".into(), U8, Kind::Steps, Mask::None, plain(Basis::Samples)));
+    found.push((
+        "listed-missing".into(),
+        F64,
+        Kind::Steps,
+        Mask::Special,
+        ConvertConfig { tolerance: 0.0, ..plain(Basis::Samples) },
+    ));
     found
 }
 
@@ -221,10 +230,10 @@ fn features_of_later_versions_are_refused_by_name() {
     file[10] = 7; // the minor version
     file[24] = 0xFF; // optional features
     assert_eq!(refused(&mut file), None);
-    file[16] = 0b1000; // a required feature
+    file[16] = 0b1_0000; // a required feature
     file[48..48 + 20].copy_from_slice(b"bases by wavesplat 3");
     let (code, message) = refused(&mut file).unwrap();
-    assert!(code == 3 && message.contains("required feature bit 3 (bases by wavesplat 3)"), "{message}");
+    assert!(code == 3 && message.contains("required feature bit 4 (bases by wavesplat 3)"), "{message}");
     file[16] = 0;
     file[8] = 2;
     let (code, message) = refused(&mut file).unwrap();

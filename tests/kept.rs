@@ -29,7 +29,7 @@ fn files() -> Vec<Stored> {
         let config = ConvertConfig { coding, block: Some(4), window, ..usual };
         stored(&mut source.clone(), &config)
     };
-    [Basis::Haar, Basis::Multi, Basis::Samples].map(file).into()
+    [Basis::Haar, Basis::Multi, Basis::Samples, Basis::Learned].map(file).into()
 }
 
 /// The samples of some frames of a box.

@@ -70,9 +70,16 @@ pub enum PartKind {
     Missing,
     /// The exact values of all samples, in place of levels and outliers.
     Exact,
+    /// The same, as places in a list of their values.
+    Listed,
 }
 
 impl PartKind {
+    /// Whether a block with such a part stores all its samples exactly.
+    pub fn is_exact(self) -> bool {
+        matches!(self, Self::Exact | Self::Listed)
+    }
+
     /// Kind and level as stored in a file.
     pub(crate) fn code(self) -> [u8; 2] {
         match self {
@@ -80,6 +87,7 @@ impl PartKind {
             Self::Outliers => [1, 0],
             Self::Missing => [2, 0],
             Self::Exact => [3, 0],
+            Self::Listed => [3, 1],
         }
     }
 
@@ -90,6 +98,7 @@ impl PartKind {
             [1, 0] => Some(Self::Outliers),
             [2, 0] => Some(Self::Missing),
             [3, 0] => Some(Self::Exact),
+            [3, 1] => Some(Self::Listed),
             _ => None,
         }
     }
@@ -102,6 +111,7 @@ impl fmt::Display for PartKind {
             Self::Outliers => f.write_str("outliers"),
             Self::Missing => f.write_str("missing samples"),
             Self::Exact => f.write_str("exact samples"),
+            Self::Listed => f.write_str("listed samples"),
         }
     }
 }
@@ -172,7 +182,7 @@ pub struct EncodedBlock {
 impl EncodedBlock {
     /// As [`BlockEntry::block_above`](crate::BlockEntry::block_above).
     pub(crate) fn block_above(&self, metadata: &Metadata) -> Option<BlockId> {
-        let is_exact = self.parts.iter().any(|part| part.kind == PartKind::Exact);
+        let is_exact = self.parts.iter().any(|part| part.kind.is_exact());
         let begins = begins_above(self.id, self.stats, is_exact, metadata.tiers(self.id.window));
         begins.then(|| metadata.above(self.id))
     }

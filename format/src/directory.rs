@@ -3,6 +3,7 @@
 use crate::block::{BlockId, BlockStats, PartKind, PartStats};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure, finite_amount, is_amount, is_range};
 use crate::file_id::FileId;
+use crate::header::Features;
 use crate::limits::{MAX_PART_RAW, MAX_PARTS, align};
 use crate::section::{FRAME, SectionId, read, read_checked};
 use crate::{Metadata, Result, Storage};
@@ -58,7 +59,7 @@ impl BlockEntry {
 
     /// Whether the block stores all its samples exactly.
     pub fn is_exact(&self) -> bool {
-        self.part(PartKind::Exact).is_some()
+        self.parts.iter().any(|part| part.kind.is_exact())
     }
 
     /// Whether it begins with the nodes of the block above, in a window with so many tiers. Without a step, all samples of a
@@ -120,8 +121,9 @@ impl BlockEntry {
         Ok(Self { id, stats, parts, lost: lost == 1 })
     }
 
-    /// Checks of a block in a window with so many tiers that do not depend on the rest of the metadata.
-    pub(crate) fn check(&self, tiers: u8) -> ParseResult {
+    /// Checks of a block in a window with so many tiers, of a file with these features, that do not depend on the rest of the
+    /// metadata.
+    pub(crate) fn check(&self, tiers: u8, announced: Features) -> ParseResult {
         let BlockStats { step, min, max, reached, squared_error, dropped } = self.stats;
         ensure(finite_amount(step) && finite_amount(reached), || "a step or an error out of range".into())?;
         ensure(is_amount(squared_error) && is_amount(dropped), || "an energy out of range".into())?;
@@ -132,6 +134,9 @@ impl BlockEntry {
         let lossy = |part: &PartEntry| matches!(part.kind, PartKind::Level(_) | PartKind::Outliers);
         let both = self.is_exact() && self.parts.iter().any(lossy);
         ensure(!both, || "both exact samples and coefficients or outliers".into())?;
+        let is_listed = self.part(PartKind::Listed).is_some();
+        ensure(!is_listed || self.part(PartKind::Exact).is_none(), || "exact samples twice".into())?;
+        ensure(!is_listed || announced.listed, || "listed values, which the header does not announce".into())?;
         let lost = !self.lost || self.encoded() == Self::lost(self.id).encoded();
         ensure(lost, || "a lost block with parts or statistics".into())?;
         self.check_tier(tiers)?;

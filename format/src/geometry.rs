@@ -5,6 +5,7 @@ use crate::bytes::{ParseResult, ensure};
 use crate::codes::sparse::CodeBox;
 use crate::codes::{max_packed, volumes};
 use crate::directory::PartEntry;
+use crate::listed::max_listed;
 use crate::planes::bitmap_len;
 use crate::pyramid::{PassBox, Pyramid};
 use crate::window::Window;
@@ -31,6 +32,12 @@ impl BlockGeometry<'_> {
     /// Frames x voxels.
     pub fn samples(&self) -> usize {
         (self.window.frames as usize).saturating_mul(self.voxels())
+    }
+
+    /// Voxels along x, y, z, and frames.
+    pub(crate) fn extents(&self) -> [usize; 4] {
+        let [x, y, z] = self.size;
+        [x, y, z, self.window.frames as usize]
     }
 
     /// Number of codes in a level part; `None` if the window has no such level.
@@ -69,7 +76,7 @@ impl BlockGeometry<'_> {
             }
             PartKind::Outliers => count.saturating_mul(4 + size),
             PartKind::Missing => (bitmap_len(self.samples()) as u64).saturating_add(count.saturating_mul(size)),
-            PartKind::Exact => count.saturating_mul(size),
+            PartKind::Exact | PartKind::Listed => count.saturating_mul(size),
         }
     }
 
@@ -77,6 +84,7 @@ impl BlockGeometry<'_> {
     pub fn max_raw_len(&self, kind: PartKind) -> u64 {
         match kind {
             PartKind::Level(level) if self.window.pyramid.is_some() => max_packed(&self.boxes(level)) as u64,
+            PartKind::Listed => max_listed(self.sample_size, self.extents()) as u64,
             _ => self.raw_len(kind, self.max_count(kind), 4),
         }
     }
@@ -90,12 +98,13 @@ impl BlockGeometry<'_> {
         let has_samples = self.tier == 0 || matches!(kind, PartKind::Level(_));
         ensure(has_samples, || format!("{kind} in tier {}", self.tier))?;
         let most = self.max_count(kind);
-        let least = if kind == PartKind::Exact { most } else { 1 };
+        let least = if kind.is_exact() { most } else { 1 };
         ensure((least..=most).contains(&count), || {
             format!("{kind}: a count of {count} where at most {most} is possible")
         })?;
         let possible = match kind {
             PartKind::Level(_) if self.window.pyramid.is_some() => raw_len <= self.max_raw_len(kind),
+            PartKind::Listed => raw_len <= self.max_raw_len(kind),
             PartKind::Level(_) => (1..=4).any(|width| self.raw_len(kind, count, width) == raw_len),
             _ => self.raw_len(kind, count, 1) == raw_len,
         };

@@ -18,14 +18,15 @@ pub(crate) const VERSION: (u16, u16) = (1, 0);
 /// The version of files with any feature.
 const FEATURES_VERSION: (u16, u16) = (1, 1);
 
-/// The version of files with tiers.
-const TIERED_VERSION: (u16, u16) = (1, 2);
+/// The version of files with tiers or listed values.
+const LATEST_VERSION: (u16, u16) = (1, 2);
 
 /// The required features that this reader supports, by bit, as messages for readers that do not.
-const REQUIRED: [&str; 3] = [
+const REQUIRED: [&str; 4] = [
     "nested parts (version 1.1 of the format): wavesplat 0.2 or later",
     "a description (version 1.1 of the format): wavesplat 0.2 or later",
     "tiers (version 1.2 of the format): wavesplat 0.2 or later",
+    "listed values (version 1.2 of the format): wavesplat 0.2 or later",
 ];
 
 /// The bit of [`Packing::Nested`].
@@ -37,6 +38,9 @@ const DESCRIBED: u64 = 2;
 /// The bit of tiers.
 const TIERED: u64 = 4;
 
+/// The bit of listed values.
+const LISTED: u64 = 8;
+
 /// The required features of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Features {
@@ -46,6 +50,8 @@ pub struct Features {
     pub described: bool,
     /// Whether windows may have tiers.
     pub tiered: bool,
+    /// Whether blocks may list their values.
+    pub listed: bool,
 }
 
 impl Features {
@@ -54,21 +60,37 @@ impl Features {
         match self.bits() {
             0 => VERSION,
             1..TIERED => FEATURES_VERSION,
-            TIERED.. => TIERED_VERSION,
+            TIERED.. => LATEST_VERSION,
         }
+    }
+
+    /// These features and others.
+    pub(crate) fn with_those_of(self, windows: Self) -> Self {
+        Self::of_bits(self.bits() | windows.bits())
+    }
+
+    /// All combinations of features.
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        (0..1 << REQUIRED.len()).map(Self::of_bits)
+    }
+
+    fn of_bits(required: u64) -> Self {
+        let packing = if required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
+        let has = |bit: u64| required & bit != 0;
+        Self { packing, described: has(DESCRIBED), tiered: has(TIERED), listed: has(LISTED) }
     }
 
     /// The field `required` of the header.
     pub(crate) fn bits(self) -> u64 {
         let nested = if self.packing == Packing::Nested { NESTED } else { 0 };
         let bit = |has: bool, bit: u64| if has { bit } else { 0 };
-        nested | bit(self.described, DESCRIBED) | bit(self.tiered, TIERED)
+        nested | bit(self.described, DESCRIBED) | bit(self.tiered, TIERED) | bit(self.listed, LISTED)
     }
 }
 
 impl From<Packing> for Features {
     fn from(packing: Packing) -> Self {
-        Self { packing, described: false, tiered: false }
+        Self { packing, ..Self::default() }
     }
 }
 
@@ -90,15 +112,16 @@ impl Header {
     /// The header of a new file with these features.
     pub(crate) fn new(id: FileId, features: Features) -> Self {
         let (required, version) = (features.bits(), features.version());
-        let told = if features.tiered { TIERED } else { required };
-        let needs = REQUIRED.get(told.trailing_zeros() as usize).copied().unwrap_or_default();
+        // The newest, but of version 1.1 the first, as its writers did.
+        let newest = required.checked_ilog2().unwrap_or(u32::MAX);
+        let told = if required < TIERED { required.trailing_zeros() } else { newest };
+        let needs = REQUIRED.get(told as usize).copied().unwrap_or_default();
         Self { version, required, optional: 0, id, needs: needs.into() }
     }
 
     /// The features that it announces.
     pub(crate) fn features(&self) -> Features {
-        let packing = if self.required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
-        Features { packing, described: self.required & DESCRIBED != 0, tiered: self.required & TIERED != 0 }
+        Features::of_bits(self.required)
     }
 
     pub(crate) fn encode(&self) -> Vec<u8> {

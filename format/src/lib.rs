@@ -17,6 +17,7 @@ mod geometry;
 mod header;
 mod leaf;
 pub mod limits;
+mod listed;
 mod metadata;
 pub mod payload;
 mod planes;
@@ -50,6 +51,7 @@ pub use file_id::FileId;
 pub use geometry::BlockGeometry;
 pub use header::Features;
 pub use leaf::LeafEntry;
+pub use listed::{Listed, unpack_listed};
 pub use metadata::{Bound, Metadata};
 pub use payload::{
     Outliers, pack_codes, pack_exact, pack_missing, pack_outliers, unpack_codes, unpack_exact, unpack_missing,

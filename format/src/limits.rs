@@ -15,6 +15,9 @@ pub const MAX_PART_RAW: u64 = 12 * MAX_BLOCK_SAMPLES;
 /// Groups of temporal levels in a window: with more, parts would be smaller than their directory entries.
 pub const MAX_LEVELS: usize = 32;
 
+/// Values of a block that lists them: a place in the list takes 16 bits.
+pub const MAX_LISTED: usize = 1 << 16;
+
 /// Parts of one block: every level, outliers, missing samples, exact samples.
 pub const MAX_PARTS: usize = MAX_LEVELS + 3;
 

@@ -141,11 +141,12 @@ impl Metadata {
         start
     }
 
-    /// The features that its windows have.
+    /// The features that its windows have. Whether blocks list their values is not known from here.
     pub fn features(&self) -> Features {
         let nested = self.windows.iter().any(|window| window.packing() == Packing::Nested);
         let packing = if nested { Packing::Nested } else { Packing::Flat };
-        Features { packing, described: false, tiered: self.windows.iter().any(|window| window.tiers() > 0) }
+        let tiered = self.windows.iter().any(|window| window.tiers() > 0);
+        Features { packing, tiered, ..Features::default() }
     }
 
     /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the

@@ -32,6 +32,7 @@ pub struct CompletePrefix {
 /// What reading a window adds to the prefix.
 #[derive(Default)]
 struct WindowScan {
+    features: Features,
     tiers: u8,
     at: u64,
     leaves: Vec<LeafEntry>,
@@ -82,7 +83,7 @@ impl CompletePrefix {
     /// Reads the next window; fails if it is not complete.
     fn read_window(&mut self, storage: &impl Storage) -> Result<()> {
         let number = self.metadata.windows.len() as u32;
-        let mut scan = WindowScan { at: self.end, ..WindowScan::default() };
+        let mut scan = WindowScan { at: self.end, features: self.features, ..WindowScan::default() };
         let at = scan.pad(storage)?;
         let (begin, record) = plain_at(storage, self.id, SectionId::Window(number), at, MAX_METADATA)?;
         scan.at = begin.end();
@@ -143,9 +144,26 @@ impl WindowScan {
         Ok(())
     }
 
+    /// Reads a block's entry from its own header at `offset`. Returns the entry and the end of its parts, which are not read.
+    fn block_at(&self, storage: &impl Storage, file: FileId, id: BlockId, offset: u64) -> Result<(BlockEntry, u64)> {
+        let section = SectionId::Block(id);
+        let (_, bytes) = plain_at(storage, file, section, offset, entry_len(MAX_PARTS))?;
+        let mut fields = FieldReader::new(&bytes);
+        let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
+            fields.end()?;
+            ensure(entry.id == id, || format!("says that it is {}", entry.id))?;
+            entry.check(self.tiers, self.features)?;
+            entry.check_place(offset)?;
+            Ok(entry)
+        });
+        let entry = entry.map_err(|what| section.corrupt(offset, what))?;
+        let end = offset + entry.header_len() + entry.stored_len();
+        Ok((entry, end))
+    }
+
     /// Reads the next block.
     fn read_block(&mut self, storage: &impl Storage, id: FileId, block: BlockId) -> Result<BlockEntry> {
-        let (entry, end) = block_at(storage, id, block, self.tiers, self.pad(storage)?)?;
+        let (entry, end) = self.block_at(storage, id, block, self.pad(storage)?)?;
         for part in &entry.parts {
             part.read(storage, id, block)?;
             self.stored += u64::from(part.stored_len);
@@ -166,28 +184,4 @@ fn plain_at(
     let (extent, content) = section_at(storage, file, section, offset, most)?;
     let same = ensure(extent.raw_len == extent.stored_len, || format!("{} bytes in its frame", extent.raw_len));
     same.map_err(|what| section.corrupt(offset, what)).map(|()| (extent, content))
-}
-
-/// Reads a block's entry from its own header at `offset`. `tiers` is the number of tiers of its window. Returns the entry and the end
-/// of its parts, which are not read.
-pub(crate) fn block_at(
-    storage: &impl Storage,
-    file: FileId,
-    id: BlockId,
-    tiers: u8,
-    offset: u64,
-) -> Result<(BlockEntry, u64)> {
-    let section = SectionId::Block(id);
-    let (_, bytes) = plain_at(storage, file, section, offset, entry_len(MAX_PARTS))?;
-    let mut fields = FieldReader::new(&bytes);
-    let entry = BlockEntry::decode(&mut fields).and_then(|entry| {
-        fields.end()?;
-        ensure(entry.id == id, || format!("says that it is {}", entry.id))?;
-        entry.check(tiers)?;
-        entry.check_place(offset)?;
-        Ok(entry)
-    });
-    let entry = entry.map_err(|what| section.corrupt(offset, what))?;
-    let end = offset + entry.header_len() + entry.stored_len();
-    Ok((entry, end))
 }

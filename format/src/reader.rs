@@ -12,6 +12,7 @@ use crate::geometry::BlockGeometry;
 use crate::header::{Features, HEADER, Header, check_magic};
 use crate::leaf::{LEAF_ENTRY, LeafEntry, MIN_BLOCK, check_leaves};
 use crate::limits::{BLOCKS_PER_LEAF, MAX_DESCRIPTION, MAX_METADATA, MAX_ROOT_RAW, align};
+use crate::listed::unpack_listed;
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::section::{FRAME, SectionId, decompress, read_checked, read_section};
@@ -144,7 +145,7 @@ impl<S: Storage> Reader<S> {
 
     fn check_entry(&self, entry: &BlockEntry) -> ParseResult {
         let geometry = self.index.metadata.geometry(entry.id).ok_or("no such block")?;
-        entry.check(geometry.window.tiers())?;
+        entry.check(geometry.window.tiers(), self.index.features)?;
         entry.parts.iter().try_for_each(|part| geometry.check(part))
     }
 
@@ -280,9 +281,12 @@ impl<S: Storage> Reader<S> {
     /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
     pub fn exact(&self, block: &BlockEntry) -> Result<Option<Vec<u8>>> {
         self.check_present(block)?;
-        let Some(part) = block.part(PartKind::Exact) else { return Ok(None) };
+        let Some(part) = block.parts.iter().find(|part| part.kind.is_exact()) else { return Ok(None) };
         let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
-        let samples = unpack_exact(&raw, geometry.sample_size, geometry.samples());
+        let samples = match part.kind {
+            PartKind::Listed => unpack_listed(&raw, geometry.sample_size, geometry.extents()),
+            _ => unpack_exact(&raw, geometry.sample_size, geometry.samples()),
+        };
         unpacked(block, part, samples, |bytes| bytes.len() / geometry.sample_size).map(Some)
     }
 
@@ -320,6 +324,7 @@ fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> ParseResu
         PartKind::Outliers => unpack_outliers(raw, size, samples).map(|outliers| outliers.positions.len()),
         PartKind::Missing => unpack_missing(raw, size, samples).map(|(_, bytes)| bytes.len() / size),
         PartKind::Exact => unpack_exact(raw, size, samples).map(|bytes| bytes.len() / size),
+        PartKind::Listed => unpack_listed(raw, size, geometry.extents()).map(|bytes| bytes.len() / size),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Recovers a damaged file: finds its intact sections without trusting its directory, and writes a new file with them
 //! (FORMAT.md section 12).
 
-use crate::block::{BlockId, EncodedBlock, EncodedPart};
+use crate::block::{BlockId, EncodedBlock, EncodedPart, PartKind};
 use crate::bytes::{FieldReader, ParseResult, ensure};
 use crate::description::Description;
 use crate::directory::{BlockEntry, PartEntry, entry_len};
@@ -39,6 +39,8 @@ pub struct Recovery {
     all_known: bool,
     /// The description, if it was found and fits the metadata.
     description: Option<Description>,
+    /// The features of the file.
+    features: Features,
 }
 
 /// The result of recovering a damaged file.
@@ -68,6 +70,8 @@ struct FoundSections {
     leaves: BTreeMap<BlockId, u64>,
     /// The record of the description.
     description: Option<Vec<u8>>,
+    /// Whether a block lists its values.
+    listed: bool,
 }
 
 /// The tags that the search looks for.
@@ -97,9 +101,10 @@ impl Recovery {
     /// [`Error::Invalid`] if nothing can be recovered, because the file id or the size of the volume is unknown;
     /// [`Error::Unsupported`] for a newer version; [`Error::Io`] if the storage fails.
     pub fn search(storage: &impl Storage, searched: &mut dyn FnMut(u64)) -> Result<Self> {
-        if let Err(newer @ Error::Unsupported(_)) = read_header(storage) {
-            return Err(newer);
-        }
+        let header = match read_header(storage) {
+            Err(newer @ Error::Unsupported(_)) => return Err(newer),
+            header => header.ok(),
+        };
         let mut ids = candidate_ids(storage)?;
         let mut whole = false;
         let mut found = FoundSections::default();
@@ -130,6 +135,10 @@ impl Recovery {
         let told = id.and_then(|id| read_footer(storage, id).ok()).map(|footer| footer.blocks);
         let mut recovery = found.assemble(id, storage.len())?;
         recovery.all_known |= told == Some(recovery.metadata.blocks());
+        let header = header.filter(|header| header.id == recovery.id); // it may be another file's
+        if let Some(told) = header.map_or_else(|| recovery.told_by_id(), |header| Some(header.features())) {
+            recovery.features = told.with_those_of(recovery.metadata.features());
+        }
         Ok(recovery)
     }
 
@@ -138,13 +147,24 @@ impl Recovery {
         &self.metadata
     }
 
+    /// The features that the file's id was made from (FORMAT.md, section 3).
+    fn told_by_id(&self) -> Option<Features> {
+        let first_digest = self.metadata.windows.first().map_or(0, |window| window.digest);
+        let has_id = |features: &Features| self.metadata.file_id(first_digest, *features).is_ok_and(|id| id == self.id);
+        Features::all().find(has_id)
+    }
+
+    /// The features of the file that [`Self::write`] makes.
+    fn features(&self) -> Features {
+        Features { described: self.description.is_some(), ..self.features }
+    }
+
     /// Writes a file with everything that is intact. Calls `done` after every block.
     ///
     /// # Errors
     /// [`Error::Io`] if the storage or writing fails.
     pub fn write<W: Write>(&self, storage: &impl Storage, out: W, done: &mut dyn FnMut()) -> Result<(W, Recovered)> {
-        let features = Features { described: self.description.is_some(), ..self.metadata.features() };
-        let mut writer = Writer::with_features(out, self.id, &self.metadata, features)?;
+        let mut writer = Writer::with_features(out, self.id, &self.metadata, self.features())?;
         let mut lost: Vec<BlockId> = Vec::new();
         for window in 0..self.metadata.windows.len() as u32 {
             writer.begin_window(self.metadata.window_record(window))?;
@@ -224,7 +244,7 @@ impl Recovery {
             check_payload(&geometry, part, &raw).map_err(Error::Invalid)?;
             Ok(EncodedPart { kind, stats, raw_len, stored })
         };
-        entry.check(geometry.window.tiers()).map_err(Error::Invalid)?;
+        entry.check(geometry.window.tiers(), self.features()).map_err(Error::Invalid)?;
         let parts = entry.parts.iter().map(part).collect::<Result<_>>()?;
         Ok(EncodedBlock { id: entry.id, stats: entry.stats, parts })
     }
@@ -266,7 +286,7 @@ impl FoundSections {
             b"META" => self.metadata = Metadata::parse(&record(SectionId::Metadata)?).ok().or(self.metadata.take()),
             b"BLCK" => {
                 let block = id_at(storage, at)?;
-                entry_at(storage, id, block, at)?;
+                self.listed |= entry_at(storage, id, block, at)?.part(PartKind::Listed).is_some();
                 self.blocks.entry(block).or_insert(at);
             }
             b"LEAF" => return self.add_leaf(storage, id, at),
@@ -296,9 +316,13 @@ impl FoundSections {
         }
         let stored = read(storage, SectionId::Root, at + FRAME as u64, stored_len.into())?;
         let Ok(raw) = decompress(&stored, raw_len) else { return Ok(false) };
-        let Ok(first) = BlockEntry::decode(&mut FieldReader::new(&raw)) else { return Ok(false) };
+        let mut entries = FieldReader::new(&raw);
+        let Ok(first) = BlockEntry::decode(&mut entries) else { return Ok(false) };
         section_at(storage, id, SectionId::Leaf(first.id), at, max)?;
+        let mut others = std::iter::from_fn(|| BlockEntry::decode(&mut entries).ok());
+        let is_listed = |entry: BlockEntry| entry.part(PartKind::Listed).is_some();
         self.leaves.entry(first.id).or_insert(at);
+        self.listed |= others.any(is_listed) || is_listed(first);
         Ok(true)
     }
 
@@ -312,7 +336,7 @@ impl FoundSections {
     }
 
     fn assemble(self, id: Option<FileId>, len: u64) -> Result<Recovery> {
-        let Self { start, metadata, mut windows, mut ends, blocks, leaves, description } = self;
+        let Self { start, metadata, mut windows, mut ends, blocks, leaves, description, listed } = self;
         for (number, m) in metadata.iter().flat_map(|m| (0..m.windows.len() as u32).map(move |number| (number, m))) {
             windows.entry(number).or_insert_with(|| m.window_record(number));
             ends.entry(number).or_insert_with(|| m.window_end(number));
@@ -343,7 +367,19 @@ impl FoundSections {
         }
         let left_behind = blocks.keys().filter(|id| id.window as usize >= all.windows.len()).count() as u64;
         let description = description.and_then(|record| Description::parse(&record, &all).ok());
-        Ok(Recovery { id, metadata: all, ends, undescribed, blocks, leaves, left_behind, all_known, description })
+        let features = Features { listed, ..all.features() };
+        Ok(Recovery {
+            id,
+            metadata: all,
+            ends,
+            undescribed,
+            blocks,
+            leaves,
+            left_behind,
+            all_known,
+            description,
+            features,
+        })
     }
 }
 

@@ -144,8 +144,19 @@ pub(crate) fn encode(
     }
     if let Some(samples) = &content.exact {
         let mut raw = Vec::new();
-        pack_exact(samples, size, &mut raw);
-        part(PartKind::Exact, samples.len() / size, 0.0, 0.0, &raw);
+        let kind = match Listed::new(samples, size, geometry.extents())
+            .filter(|_| geometry.window.pyramid.is_some() && samples[0] % 2 == 0)
+        {
+            Some(listed) => {
+                listed.pack(&mut Vec::new(), &mut raw);
+                PartKind::Listed
+            }
+            None => {
+                pack_exact(samples, size, &mut raw);
+                PartKind::Exact
+            }
+        };
+        part(kind, samples.len() / size, 0.0, 0.0, &raw);
     }
     let stats = BlockStats { step: 0.5, min: -1.0, max: 2.0, reached: 0.125, squared_error: 0.5, dropped: 0.25 };
     let stats = if id.tier > 0 { BlockStats { step: 0.5, ..BlockEntry::lost(id).stats } } else { stats };
@@ -181,7 +192,7 @@ pub(crate) fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)])
                 PartKind::Level(_) => window.coded += part.stats.count,
                 PartKind::Outliers => window.outliers += part.stats.count,
                 PartKind::Missing => window.missing += part.stats.count,
-                PartKind::Exact => {}
+                PartKind::Exact | PartKind::Listed => {}
             }
         }
     }
@@ -209,7 +220,10 @@ pub(crate) fn write_but<'a>(
     id: FileId,
     lost: Option<BlockId>,
 ) -> Result<(Vec<u8>, Summary)> {
-    let mut writer = Writer::new(Vec::new(), id, metadata)?;
+    let blocks: Vec<&EncodedBlock> = blocks.into_iter().collect();
+    let listed = blocks.iter().any(|block| block.parts.iter().any(|part| part.kind == PartKind::Listed));
+    let features = Features { listed, ..metadata.features() };
+    let mut writer = Writer::with_features(Vec::new(), id, metadata, features)?;
     writer.begin_window(metadata.window_record(0))?;
     for block in blocks {
         let ended = writer.metadata().windows.len() as u32;

@@ -176,7 +176,7 @@ impl<W: Write> Writer<W> {
         self.pad()?;
         let entry = self.entry_here(block, lost)?;
         let tiers = self.window.as_ref().map_or(0, |record| record.window.tiers());
-        entry.check(tiers).map_err(|what| Error::Invalid(format!("{}: {what}", block.id)))?;
+        entry.check(tiers, self.features).map_err(|what| Error::Invalid(format!("{}: {what}", block.id)))?;
         let mut bytes = Vec::new();
         entry.encode(&mut bytes);
         let leaf = self.leaf.get_or_insert_with(|| LeafEntry::new(block.id, self.position));

@@ -169,7 +169,7 @@ fn a_few_voxels_over_a_long_time_need_longer_windows_and_are_no_noise() {
 
 #[test]
 fn long_windows_learn_functions_only_where_these_take_few_bytes() {
-    let common = |x: usize, y: usize, z: usize, t: usize| ((x + y * 3 + z * 5) % 7) as f32 * (t as f32 / 40.0).sin();
+    let common = |x: usize, y: usize, z: usize, t: usize| ((x + y * 3 + z * 5) % 7) as f32 * (t * 7919 % 1009) as f32;
     let own = |x: usize, y: usize, z: usize, t: usize| ((t * t * (x + 2 * y + 4 * z + 3)) % 101) as f32;
     let work = Work::new();
     let check = |archive: Archive, learns: bool| {

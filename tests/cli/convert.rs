@@ -117,6 +117,29 @@ fn bytes_depend_on_settings_and_not_on_chance() {
 }
 
 #[test]
+fn a_file_is_made_best_for_what_is_read_most() {
+    let (work, archive) = (Work::new(), small());
+    work.write("a.npy", archive.npy());
+    for (options, window, block) in [
+        ("", 32, 20),
+        ("--best-for series", 128, 20),
+        ("--best-for pictures", 8, 20),
+        ("--best-for size", 32, 20),
+        ("--best-for series --window 16 --block 8", 16, 8),
+    ] {
+        work.wavesplat(&format!("convert a.npy -o a.wspl --force {options}")).ok();
+        let told = work.wavesplat("info a.wspl").ok();
+        let has = |name: &str, number: usize| {
+            told.text().contains(&format!("--{name}={number}\n"))
+                || told.text().contains(&format!("--{name}={number} "))
+        };
+        assert!(has("window", window) && has("block", block), "{options}: {}", told.text());
+        work.wavesplat("verify a.wspl --against a.npy").ok();
+    }
+    work.wavesplat("convert a.npy -o b.wspl --best-for speed").fails(2, &["best-for", "series", "pictures", "size"]);
+}
+
+#[test]
 fn the_report_is_one_json_object() {
     let work = Work::new();
     work.write("a.npy", small().npy());

@@ -1,6 +1,7 @@
 //! Recovery of damaged files: intact blocks are recovered and shown; lost blocks are named and never shown as data.
 
 use super::{Archive, Work, floats, places_of, read_npy};
+use wavesplat::file::CoefficientFile;
 
 /// Five windows of eight frames, in 24 blocks each.
 fn work() -> (Work, Vec<u8>) {
@@ -43,6 +44,27 @@ fn without_its_directory_a_file_is_recovered_to_the_same_bytes() {
     work.write("bad.wspl", &bad);
     work.wavesplat("recover bad.wspl -o saved.wspl --force").ok();
     assert!(work.read("saved.wspl") == file, "without a header, by the footer's id");
+}
+
+/// Blocks of labels are lists, which need none above them: only the header tells that there might be some.
+#[test]
+fn a_file_of_labels_has_no_tiers_and_is_recovered_to_itself() {
+    let work = Work::new();
+    let label =
+        |x: usize, y: usize, z: usize, t: usize| ((x / 3 + 1) * (y / 3 + 2) * (z / 3 + 3) * (t / 4 + 5) % 7) as f32;
+    work.write("a.npy", Archive::of([20, 24, 21], 16, label).npy());
+    work.wavesplat("convert a.npy -o a.wspl --block 8").ok();
+    let file = work.read("a.wspl");
+    assert_eq!((file[16], CoefficientFile::open(work.path("a.wspl")).unwrap().metadata().tiers(0)), (0b1101, 0));
+    let mut bad = file.clone();
+    bad[..64].fill(0);
+    work.write("bad.wspl", &bad);
+    for name in ["a.wspl", "bad.wspl"] {
+        work.wavesplat(&format!("recover {name} -o saved.wspl --force")).ok();
+        assert!(work.read("saved.wspl") == file, "{name}");
+    }
+    work.wavesplat("extract a.wspl -o b.npy").ok();
+    assert!(work.read("b.npy").ends_with(&work.read("a.npy")[128..]), "exactly");
 }
 
 #[test]
@@ -153,11 +175,11 @@ fn unrecoverable_files_are_reported() {
     work.write("start.wspl", &file[..700]);
     work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be recovered"]);
     let mut newer = file.clone();
-    newer[16] = 8; // a feature of a later version
+    newer[16] = 16; // a feature of a later version
     let sum = xxhash_rust::xxh3::xxh3_64(&newer[..120]).to_le_bytes();
     newer[120..128].copy_from_slice(&sum);
     work.write("newer.wspl", &newer);
-    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 3"]);
+    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 4"]);
     work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace the input"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "newer.wspl", "start.wspl", "text.wspl"]);
 }

@@ -27,7 +27,7 @@ measure prints a line of JSON for every file, tolerance and peer:
     encode_seconds, decode_seconds   array to bytes and back, in memory
 
 Seconds are those of the processor, on one thread and one core, the least of so many repeats after one that is not
-counted. Where a peer misses its bound, a line on standard error says so.
+counted. Where a peer misses its bound or cannot code an archive, a line on standard error says so.
 """
 
 import argparse
@@ -81,7 +81,11 @@ def measure(path, tolerances, peers, repeats):
         bound = tolerance * value_range
         for peer in peers:
             coder = CODERS[peer]
-            blobs, encode_seconds = least_seconds(repeats, lambda: coder.encode(series, bound))
+            try:
+                blobs, encode_seconds = least_seconds(repeats, lambda: coder.encode(series, bound))
+            except Exception as why:  # coders raise what they like
+                print(f"{path}, {tolerance:g}, {peer}: cannot code this archive: {why}", file=sys.stderr)
+                continue
             decode = lambda: coder.decode(blobs, series.shape, series.dtype)
             decoded, decode_seconds = least_seconds(repeats, decode)
             yield {

@@ -31,6 +31,7 @@ ALIGN = 64
 BLOCKS_PER_LEAF = 512
 MAX_BLOCK_SAMPLES = 8388608
 MAX_PART_RAW = 100663296
+MAX_LISTED = 65536
 MAX_LEVELS = 32
 MAX_PARTS = 35
 MAX_WINDOW_FRAMES = 1025
@@ -490,8 +491,8 @@ def plain_sum(values) -> float:
     return total
 
 
-def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int) -> None:
-    """Sections 5 and 9: an entry by itself and with the block's geometry."""
+def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, listed: bool) -> None:
+    """Sections 5 and 9: an entry by itself and with the block's geometry. `listed`: blocks may list their values."""
     place = b.place
     need(b.lost <= 1, place, "lost is neither 0 nor 1")
     need(finite(b.step, b.reached) and b.reached >= 0, place, "step or error is not finite")
@@ -509,6 +510,8 @@ def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int) -
     keys = [(p.kind, p.level) for p in b.parts]
     need(all(k < l for k, l in zip(keys, keys[1:])), place, "parts do not ascend")
     need(not b.exact or all(p.kind in (MISSING, EXACT) for p in b.parts), place, "exact beside levels or outliers")
+    need(sum(p.kind == EXACT for p in b.parts) <= 1, place, "two exact parts")
+    need(listed or (EXACT, 1) not in keys, place, "listed values are not announced")
     for p in b.parts:
         check_part(p, w, b.tier, size, sample_bytes, f"{place}, part of kind {p.kind}, level {p.level}")
 
@@ -516,7 +519,7 @@ def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int) -
 def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: str) -> None:
     need(p.reserved == p.reserved_too == 0, place, "reserved bytes are not zero")
     need(p.kind <= EXACT, place, "there is no such kind")
-    need(p.level < (w.level_parts if p.kind == LEVEL else 1), place, "there is no such level")
+    need(p.level < {LEVEL: w.level_parts, EXACT: 2}.get(p.kind, 1), place, "there is no such level")
     need(p.count >= 1, place, "count is 0")
     need(p.energy >= 0 and finite(p.largest) and p.largest >= 0, place, "bad energy or largest amount")
     need(p.kind == LEVEL or p.energy == p.largest == 0, place, "energy, but not of a level")
@@ -534,6 +537,10 @@ def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: st
         fits = p.raw == (4 + s) * p.count
     elif p.kind == MISSING:
         fits = p.raw == -(-samples // 8) + s * p.count
+    elif p.level == 1:
+        cells = math.prod(cells_of((*size, w.frames)))
+        longest = 8 + s * min(MAX_LISTED, samples) + lattice_most(cells, samples)
+        fits = p.count == samples and p.raw <= longest
     else:
         fits = p.count == samples and p.raw == s * samples
     need(p.count <= most, place, "count is too large")
@@ -595,6 +602,23 @@ def read_missing(data: bytes, dtype, count: int, samples: int, place: str):
     return mask, planes(data[split:], dtype, count)
 
 
+def read_listed(data: bytes, dtype: np.dtype, extents: tuple[int, ...], place: str) -> np.ndarray:
+    """Exact samples: a list of values, and for each sample its place in the list. `extents` are along x, y, z, t."""
+    r = Record(data, place)
+    n, base, predictor = r.get("IHH")
+    need(1 <= n <= MAX_LISTED, place, "too few or too many values in the list")
+    need(base < n, place, "the base is not in the list")
+    need(predictor <= 2, place, "there is no such predictor")
+    values = planes(r.take(dtype.itemsize * n), f"<u{dtype.itemsize}", n)
+    need((values[:-1] < values[1:]).all(), place, "the values do not ascend")
+    (places,) = read_lattice(r, [extents], True, None)
+    if predictor:
+        places = np.cumsum(places, axis=3 if predictor == 1 else 0)  # [t, z, y, x]
+    places = places + base
+    need(places.min() >= 0 and places.max() < n, place, "a place is not in the list")
+    return values.view(dtype)[places].reshape(-1)
+
+
 # ---------------------------------------------------------------- lattice codes (section 7)
 
 STREAM_OF_ACTIVITY = [0] + [1] * 2 + [2] * 5 + [3] * 8 + [4] * 17  # a is 0 .. 32
@@ -648,13 +672,17 @@ def lattice_most(cells: int, codes: int) -> int:
     return 45 + s + 5 * (9 + s // 4096) + -(-29 * codes // 8)
 
 
-def read_lattice(data: bytes, boxes: list, nested: bool, count: int, place: str) -> list[np.ndarray]:
-    """The codes of boxes with these extents, as arrays [t, z, y, x]."""
-    r = Record(data, place)
+def read_lattice(r: Record, boxes: list, nested: bool, count: int | None) -> list[np.ndarray]:
+    """The codes of boxes with these extents, as arrays [t, z, y, x]. The record ends with them.
+
+    `count` is the number of nonzero codes. None: the part does not say.
+    """
+    place = r.place
     lengths = [take_number(r) for _ in range(9)]
     cells = [math.prod(cells_of(b)) for b in boxes]
     need(sum(lengths[:5]) == sum(cells), place, "significance streams do not fit the cells")
-    need(sum(lengths[5:]) == count, place, "value streams do not fit the count")
+    need(count is None or sum(lengths[5:]) == count, place, "value streams do not fit the count")
+    need(sum(lengths[5:]) <= sum(map(math.prod, boxes)), place, "value streams do not fit the codes")
     symbols = read_segments(r, nested, sum(lengths))
     ends = np.cumsum([0] + lengths)
     streams = [symbols[a:b] for a, b in zip(ends, ends[1:])]
@@ -1185,12 +1213,13 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
         if head.major != 1:
             raise Unsupported("header", f"version {head.major}", 8)
-        if head.required > 7:
+        if head.required > 15:
             words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
             raise Unsupported("header", f"the file needs: {words}", 16)
         need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
         self.id = head.id
-        self.nested, self.described, self.tiered = (bool(head.required & bit) for bit in (1, 2, 4))
+        features = [bool(head.required & bit) for bit in (1, 2, 4, 8)]
+        self.nested, self.described, self.tiered, self.listed = features
 
     def _footer(self) -> None:
         """Checks the footer and the places of metadata and root."""
@@ -1309,7 +1338,7 @@ class Archive:
         for i, b in enumerate(blocks):
             key = (leaf.window, leaf.first_block + i, leaf.channel, leaf.tier)
             need(b.where == key, place, "blocks are not in order")
-            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize)
+            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize, self.listed)
             part_at = at + FRAME.size + len(b.bytes)
             for p in b.parts:
                 need(p.offset == part_at, b.place, f"a part does not begin at byte {part_at}", p.offset)
@@ -1339,8 +1368,7 @@ class Archive:
         """Whether a block is lost, or begins with the nodes of one that is."""
         if b is None or b.lost:
             return b is not None
-        is_exact = any(p.kind == EXACT for p in b.parts)
-        return (b.tier > 0 or b.step > 0 and not is_exact) and self.lost(self.above(b))
+        return (b.tier > 0 or b.step > 0 and not b.exact) and self.lost(self.above(b))
 
     def payload(self, b: Block, p) -> bytes:
         """The content of a part after decompression."""
@@ -1356,6 +1384,9 @@ class Archive:
         payloads = {(p.kind, p.level): (p, self.payload(b, p)) for p in b.parts}
         if (EXACT, 0) in payloads:
             out = planes(payloads[EXACT, 0][1], dtype, count)
+        elif (EXACT, 1) in payloads:
+            place = f"{b.place}, part of kind {EXACT}, level 1"
+            out = read_listed(payloads[EXACT, 1][1], dtype, (*size, w.frames), place)
         else:
             with np.errstate(all="ignore"):
                 c = self._coefficients(b, w, size, payloads)
@@ -1395,7 +1426,7 @@ class Archive:
         for level, (part, data) in levels.items():
             mine = [box for box in boxes(extents, p, b.tier) if box.part == level]
             place = f"{b.place}, level {level}"
-            read = read_lattice(data, [box.counts for box in mine], p.nested, part.count, place)
+            read = read_lattice(Record(data, place), [box.counts for box in mine], p.nested, part.count)
             for box, found in zip(mine, read):
                 even = tuple(slice(None, None, 2 if a in box.others else 1) for a in (2, 1, 0))
                 need(not box.others or not found[(slice(None), *even)].any(), place, "a code that is not of this box")

@@ -125,7 +125,8 @@ fn limits_are_as_specified() {
     #[rustfmt::skip]
     let limits = [
         ("ALIGN", ALIGN), ("BLOCKS_PER_LEAF", BLOCKS_PER_LEAF.into()), ("MAX_BLOCK_SAMPLES", MAX_BLOCK_SAMPLES),
-        ("MAX_PART_RAW", MAX_PART_RAW), ("MAX_LEVELS", MAX_LEVELS as u64), ("MAX_PARTS", MAX_PARTS as u64),
+        ("MAX_PART_RAW", MAX_PART_RAW), ("MAX_LISTED", MAX_LISTED as u64),
+        ("MAX_LEVELS", MAX_LEVELS as u64), ("MAX_PARTS", MAX_PARTS as u64),
         ("MAX_WINDOW_FRAMES", MAX_WINDOW_FRAMES.into()), ("MAX_COEFFICIENTS", MAX_COEFFICIENTS.into()),
         ("MAX_DIM", MAX_DIM), ("MAX_CHANNELS", MAX_CHANNELS.into()), ("MAX_TIERS", MAX_TIERS.into()), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
         ("MAX_ROOT_RAW", MAX_ROOT_RAW), ("MAX_DESCRIPTION", MAX_DESCRIPTION as u64),

@@ -88,11 +88,13 @@ impl fmt::Display for Region {
 
 impl Region {
     /// Number of voxels along x, y, z.
+    #[inline]
     pub fn dims(&self) -> [usize; 3] {
         std::array::from_fn(|a| self.end[a].saturating_sub(self.start[a]))
     }
 
     /// Number of voxels.
+    #[inline]
     pub fn voxels(&self) -> usize {
         self.dims().iter().product()
     }
@@ -141,6 +143,7 @@ impl Region {
     }
 
     /// Index of a voxel in the array of this region.
+    #[inline]
     pub fn index(&self, voxel: [usize; 3]) -> usize {
         let d = self.dims();
         let [x, y, z] = std::array::from_fn(|a| voxel[a] - self.start[a]);

@@ -4,9 +4,8 @@
 //! voxels that the coarsest level of detail decodes. Blocks without a pyramid are decoded whole.
 
 use super::WindowCodec;
-use super::decode::Block;
+use super::decode::{Block, WantedFrames};
 use crate::base::sample;
-use crate::wavelet;
 use wavesplat_format::BlockEntry;
 
 /// The coarsest level of detail that is used. Its nodes are exactly those of the first level part, so a coarser one
@@ -38,8 +37,9 @@ pub fn thinned<E>(
     if entry.lost {
         return Ok(vec![f32::NAN; frames.len() * taken.len()]);
     }
-    let block = read(&wavelet::needed(&codec.synthesis, frames))?;
-    let (bytes, each) = (block.samples(codec), codec.sample.size());
+    let wanted = WantedFrames::new(codec, frames.to_vec());
+    let block = read(&wanted.coefficients)?;
+    let (bytes, each) = (block.samples_of(codec, &wanted), codec.sample.size());
     let mut values = vec![0.0; block.voxels];
     let mut samples = Vec::with_capacity(frames.len() * taken.len());
     for frame in frames {

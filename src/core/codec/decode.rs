@@ -10,6 +10,7 @@ use super::codes::Codes;
 use super::field::{Above, Field, Plane, Stored};
 use super::rows::Change;
 use crate::base::sample::{self, SampleType};
+use crate::wavelet;
 use std::collections::HashMap;
 use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
@@ -36,6 +37,27 @@ pub struct Block {
     pub exact: Option<Vec<u8>>,
     /// The number of stored bytes read.
     pub bytes_read: u64,
+}
+
+/// Some frames of a window, and the coefficients that they need.
+#[derive(Debug, Clone)]
+pub struct WantedFrames {
+    /// Their numbers in the window.
+    pub frames: Vec<usize>,
+    /// Which coefficients affect them.
+    pub coefficients: Vec<bool>,
+}
+
+impl WantedFrames {
+    /// These frames.
+    pub fn new(codec: &WindowCodec, frames: Vec<usize>) -> Self {
+        Self { coefficients: wavelet::needed(&codec.synthesis, &frames), frames }
+    }
+
+    /// All frames of the window.
+    pub fn all(codec: &WindowCodec) -> Self {
+        Self { frames: (0..codec.frames()).collect(), coefficients: vec![true; codec.basis.coefficients()] }
+    }
 }
 
 impl Block {
@@ -177,7 +199,9 @@ impl Block {
         let decoded = self.decoded_voxels(codec);
         let samples = || (0..codec.frames()).flat_map(|frame| decoded.iter().map(move |voxel| frame * all + voxel));
         if let Some(exact) = &mut self.exact {
-            *exact = samples().flat_map(|at| exact[at * size..(at + 1) * size].to_vec()).collect();
+            let mut kept = Vec::with_capacity(codec.frames() * decoded.len() * size);
+            samples().for_each(|at| kept.extend_from_slice(&exact[at * size..][..size]));
+            *exact = kept;
         }
         let stored = |positions: &mut dyn Iterator<Item = usize>, bytes: &[u8]| -> HashMap<usize, Vec<u8>> {
             positions.zip(bytes.chunks_exact(size).map(<[u8]>::to_vec)).collect()
@@ -268,20 +292,17 @@ impl Block {
         Plane::decode(codec, self.stored(), k, single, double)
     }
 
-    /// The value that the directory must store for each level part: its largest coefficient, or with a pyramid the
-    /// largest change from leaving out this part and all finer ones.
-    pub fn largest(&self, codec: &WindowCodec) -> Vec<f64> {
+    /// The value that the directory must store for each level part with codes: its largest coefficient, or with a pyramid the largest
+    /// change of the decoded `field` from leaving out this part and all finer ones.
+    pub fn largest(&self, codec: &WindowCodec, field: &Field<'_>) -> Vec<f64> {
         let Some(pyramid) = &codec.scheme.pyramid else {
             let of_codes = |codes: &[i32]| codes.iter().fold(0.0, |m: f64, c| m.max((f64::from(*c) * self.step).abs()));
             let of_level = |level| self.codes.dense().get(codec.level_range(level, self.of)).map_or(0.0, of_codes);
             return (0..codec.parts() as u8).map(of_level).collect();
         };
         let passes = codec.passes(pyramid, self.of);
-        self.field(codec)
-            .changes(&passes, self.step, self.codes.sparse(), self.above.as_ref())
-            .iter()
-            .map(Change::largest)
-            .collect()
+        let changes = field.changes(&passes, self.step, self.codes.sparse(), self.above.as_ref());
+        changes.iter().map(Change::largest).collect()
     }
 
     /// Whether a sample is missing.
@@ -289,15 +310,22 @@ impl Block {
         self.missing.0.get(index).copied().unwrap_or(false)
     }
 
-    /// Calls `visit(index of the first, values)` for all samples decoded from coefficients, a run of voxels at a time.
+    /// Calls `visit(index of the first, values)` for the samples of some frames that are decoded from coefficients, a run of voxels
+    /// at a time.
     /// Outliers and missing samples are not yet in place.
-    pub fn for_each_run(&self, codec: &WindowCodec, visit: impl FnMut(usize, &[f64])) {
-        let field = self.field(codec);
+    pub fn for_each_run(&self, codec: &WindowCodec, wanted: &WantedFrames, visit: impl FnMut(usize, &[f64])) {
+        let field = self.field_of(codec, wanted);
         if codec.scheme.basis == Basis::Samples {
-            field.for_each_run_of_samples(codec.frames() * self.voxels, visit);
+            field.for_each_run_of_samples(self.voxels, &wanted.frames, visit);
         } else {
-            field.for_each_run(codec.basis.as_ref(), self.voxels, visit);
+            field.for_each_run(codec.basis.as_ref(), self.voxels, &wanted.frames, visit);
         }
+    }
+
+    /// The coefficients that some frames need, and possibly others.
+    fn field_of(&self, codec: &WindowCodec, wanted: &WantedFrames) -> Field<'_> {
+        let is_refined = codec.scheme.pyramid.is_some();
+        if is_refined { self.refined(codec, &wanted.coefficients) } else { self.field(codec) }
     }
 
     /// The series of one voxel, decoded from the coefficients.
@@ -307,22 +335,29 @@ impl Block {
 
     /// All samples of the block in their own type, little-endian, `frame * voxels + voxel`.
     pub fn samples(&self, codec: &WindowCodec) -> Buffer<u8> {
+        self.samples_of(codec, &WantedFrames::all(codec))
+    }
+
+    /// As [`Self::samples`]; only some frames have their samples.
+    pub fn samples_of(&self, codec: &WindowCodec, wanted: &WantedFrames) -> Buffer<u8> {
         if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
-            let field = self.field(codec);
+            let field = self.field_of(codec, wanted);
             if let Some(values) = field.singles() {
-                return self.stored_singles(codec, values);
+                return self.stored_singles(codec, values, &wanted.frames);
             }
         }
-        self.decode(codec, |_, _| {})
+        self.decode(codec, wanted, |_, _| {})
     }
 
     /// Samples in the case that nodes are samples and already have the sample type.
-    fn stored_singles(&self, codec: &WindowCodec, values: &[f32]) -> Buffer<u8> {
+    fn stored_singles(&self, codec: &WindowCodec, values: &[f32], frames: &[usize]) -> Buffer<u8> {
         let mut out = Buffer::with_len(4 * values.len());
-        for (bytes, value) in out.as_chunks_mut().0.iter_mut().zip(values) {
-            *bytes = value.to_le_bytes();
+        for frame in frames {
+            let of_frame = frame * self.voxels..(frame + 1) * self.voxels;
+            let bytes = &mut out.as_chunks_mut().0[of_frame.clone()];
+            bytes.iter_mut().zip(&values[of_frame]).for_each(|(bytes, value)| *bytes = value.to_le_bytes());
         }
-        clip(codec, &mut out);
+        self.clip(codec, frames, &mut out);
         self.put_overrides(4, &mut out);
         out
     }
@@ -330,7 +365,8 @@ impl Block {
     /// As [`Self::samples`], with the values that are splatted, which are not rounded to the sample type.
     pub fn samples_and_values(&self, codec: &WindowCodec) -> (Buffer<u8>, Buffer<f64>) {
         let mut values = Buffer::with_len(codec.frames() * self.voxels);
-        let samples = self.decode(codec, |at, run| values[at..at + run.len()].copy_from_slice(run));
+        let samples =
+            self.decode(codec, &WantedFrames::all(codec), |at, run| values[at..at + run.len()].copy_from_slice(run));
         if self.exact.is_some() {
             sample::load(codec.sample, &samples, &mut values);
         }
@@ -341,22 +377,29 @@ impl Block {
         (samples, values)
     }
 
-    /// Decodes all samples; `visit(index of the first, values)` gets values before they are rounded.
-    fn decode(&self, codec: &WindowCodec, mut visit: impl FnMut(usize, &[f64])) -> Buffer<u8> {
+    /// Decodes the samples of some frames; `visit(index of the first, values)` gets values before they are rounded.
+    fn decode(&self, codec: &WindowCodec, wanted: &WantedFrames, mut visit: impl FnMut(usize, &[f64])) -> Buffer<u8> {
         let size = codec.sample.size();
         let mut out = Buffer::with_len(codec.frames() * self.voxels * size);
         match &self.exact {
             Some(exact) => out.copy_from_slice(exact),
             None => {
-                self.for_each_run(codec, |at, values| {
+                self.for_each_run(codec, wanted, |at, values| {
                     visit(at, values);
                     sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
                 });
-                clip(codec, &mut out);
+                self.clip(codec, &wanted.frames, &mut out);
             }
         }
         self.put_overrides(size, &mut out);
         out
+    }
+
+    /// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
+    fn clip(&self, codec: &WindowCodec, frames: &[usize], samples: &mut [u8]) {
+        let Some(range) = codec.clip else { return };
+        let each = self.voxels * codec.sample.size();
+        frames.iter().for_each(|frame| clip(codec.sample, range, &mut samples[frame * each..][..each]));
     }
 
     /// Replaces samples by outliers and missing samples.
@@ -370,9 +413,7 @@ impl Block {
     }
 }
 
-/// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
-fn clip(codec: &WindowCodec, samples: &mut [u8]) {
-    let (Some((lo, hi)), ty) = (codec.clip, codec.sample) else { return };
+fn clip(ty: SampleType, (lo, hi): (f64, f64), samples: &mut [u8]) {
     let mut values = vec![0.0; CLIPPED];
     for run in samples.chunks_mut(CLIPPED * ty.size()) {
         let values = &mut values[..run.len() / ty.size()];

@@ -6,7 +6,7 @@
 //! 3. Decode with the arithmetic of [`super::decode`], and compare with the source in the measure of the bound
 //!    (eq 21-23).
 //! 4. Store the samples that miss the bound exactly. Store all samples exactly if too many miss it, or if that is
-//!    smaller.
+//!    smaller: their bytes, or if they have few values the places in a list of these.
 //!
 //! So the bound holds for any finite input and any basis, and includes rounding and quantisation errors. Missing
 //! samples are stored without loss: a mask, and their own bytes.
@@ -17,12 +17,13 @@ use super::check::Tally;
 use super::codes::Codes;
 use super::error_weights::QuantizerSetup;
 use super::field::{Above, Field};
+use super::listed::may_be_smaller;
 use super::load::{Missing, load_group};
 use super::refine::{Coded, Source};
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
-use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
+use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Listed, PartKind, PartStats};
 use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 
 /// The encoder of one worker; its scratch is reused from block to block.
@@ -83,9 +84,9 @@ impl Encoder {
         };
         let coded = match coded {
             Some(coded) => self.coded_parts(codec, size, &coded)?,
-            None => self.exact_parts(codec, samples, &missing)?,
+            None => self.exact_parts(codec, samples, &missing, None)?,
         };
-        let Parts { stats, share, mut parts } = self.smaller(codec, samples, &missing, coded)?;
+        let Parts { stats, share, mut parts } = self.smaller(codec, size, samples, &missing, coded)?;
         if missing.count > 0 {
             pack_missing(&missing.mask, &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
@@ -209,39 +210,54 @@ impl Encoder {
         Ok(Parts::new(&coded.tally, coded.step, coded.dropped, parts).clipped(codec.clip))
     }
 
-    /// The parts of a block stored exactly.
+    /// The parts of a block stored exactly, by its bytes or by its list of values.
     fn exact_parts(
         &mut self,
         codec: &WindowCodec,
         samples: &[u8],
         missing: &Missing,
+        listed: Option<&Listed>,
     ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::new();
         sample::for_each_run(codec.sample, samples, |first, values| {
             let present = values.iter().zip(&missing.mask[first..]).filter(|(_, missing)| !**missing);
             present.for_each(|(value, _)| tally.add(*value, 0.0));
         });
-        pack_exact(samples, codec.sample.size(), clear(&mut self.raw));
-        let count = (samples.len() / codec.sample.size()) as u64;
-        let stats = PartStats { count, energy: 0.0, largest: 0.0 };
-        let part = self.compressor.part(PartKind::Exact, stats, &self.raw)?;
+        let size = codec.sample.size();
+        clear(&mut self.raw);
+        let kind = match listed {
+            Some(listed) => {
+                listed.pack(&mut self.codes, &mut self.raw);
+                PartKind::Listed
+            }
+            None => {
+                pack_exact(samples, size, &mut self.raw);
+                PartKind::Exact
+            }
+        };
+        let count = (samples.len() / size) as u64;
+        let part = self.compressor.part(kind, PartStats { count, energy: 0.0, largest: 0.0 }, &self.raw)?;
         Ok(Parts::new(&tally, 0.0, 0.0, vec![part]))
     }
 
-    /// The coded parts, or exact ones if those are smaller. Exact storage is tried only if coding saved less than half.
+    /// The coded parts, or exact ones if those are smaller. Bytes are tried only if coding saved less than half, and a list only if
+    /// it may pay.
     fn smaller(
         &mut self,
         codec: &WindowCodec,
+        size: [usize; 3],
         samples: &[u8],
         missing: &Missing,
         coded: Parts,
     ) -> wavesplat_format::Result<Parts> {
-        let size = |coded: &Parts| coded.parts.iter().map(|p| p.stored.len()).sum::<usize>();
-        if size(&coded) < samples.len() / 2 || coded.parts.iter().any(|p| p.kind == PartKind::Exact) {
-            return Ok(coded);
+        let mut best = coded;
+        if best.bytes() >= samples.len() / 2 && best.parts.iter().all(|part| part.kind != PartKind::Exact) {
+            best = best.or(self.exact_parts(codec, samples, missing, None)?);
         }
-        let exact = self.exact_parts(codec, samples, missing)?;
-        Ok(if size(&exact) < size(&coded) { exact } else { coded })
+        if let Some(listed) = listed(codec, size, samples, best.bytes()) {
+            best = best.or(self.exact_parts(codec, samples, missing, Some(&listed))?);
+        }
+        Ok(best)
     }
 }
 
@@ -264,7 +280,24 @@ struct Parts {
     parts: Vec<EncodedPart>,
 }
 
+/// The samples of a block of some voxels by their values, if the file may list them and that may take less than `bytes`.
+pub(super) fn listed(codec: &WindowCodec, voxels: [usize; 3], samples: &[u8], bytes: usize) -> Option<Listed> {
+    let ([x, y, z], size) = (voxels, codec.sample.size());
+    let may_pay = codec.lists && may_be_smaller(samples, size, x * y * z, bytes);
+    may_pay.then(|| Listed::new(samples, size, [x, y, z, codec.frames()])).flatten()
+}
+
 impl Parts {
+    /// Bytes of the file that they take, without entries.
+    fn bytes(&self) -> usize {
+        self.parts.iter().map(|part| part.stored.len()).sum()
+    }
+
+    /// These, or others that take less.
+    fn or(self, other: Self) -> Self {
+        if other.bytes() < self.bytes() { other } else { self }
+    }
+
     /// The parts with the range that extracted samples are kept within.
     fn clipped(mut self, clip: Option<(f64, f64)>) -> Self {
         if let Some((lo, hi)) = clip.filter(|_| self.stats.min <= self.stats.max) {

@@ -226,7 +226,7 @@ impl<'a> Field<'a> {
         if let Values::Double(values) = &self.values { Some(values) } else { None }
     }
 
-    /// The change from leaving out each level part of a pyramid and all finer ones.
+    /// The change from leaving out each level part of a pyramid that has codes, and all finer ones.
     pub(super) fn changes(
         &self,
         passes: &PredictionPasses<'_>,
@@ -234,9 +234,10 @@ impl<'a> Field<'a> {
         codes: &SparseCodes,
         above: Option<&Above>,
     ) -> Vec<Change> {
+        let parts = passes.coded(codes);
         match &self.values {
-            Values::Single(field) => passes.changes(&[true; PARTS], step, codes, above.map(Above::singles), field),
-            Values::Double(field) => passes.changes(&[true; PARTS], step, codes, above.map(Above::doubles), field),
+            Values::Single(field) => passes.changes(&parts, step, codes, above.map(Above::singles), field),
+            Values::Double(field) => passes.changes(&parts, step, codes, above.map(Above::doubles), field),
             Values::Zero | Values::Codes { .. } => vec![Change::default(); PARTS],
         }
     }
@@ -251,26 +252,41 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Calls `visit(index of the first, values)` for all decoded samples, a run of voxels at a time.
-    pub(super) fn for_each_run(&self, basis: &dyn TimeBasis, voxels: usize, mut visit: impl FnMut(usize, &[f64])) {
+    /// Calls `visit(index of the first, values)` for all decoded samples of some frames, a run of voxels at a time.
+    pub(super) fn for_each_run(
+        &self,
+        basis: &dyn TimeBasis,
+        voxels: usize,
+        frames: &[usize],
+        mut visit: impl FnMut(usize, &[f64]),
+    ) {
         let used = Used::new(basis, &self.marked);
-        let basis = used.basis(basis);
+        let (all, some) = (used.basis(basis), used.basis(basis).only_frames(frames));
+        let basis = some.as_deref().unwrap_or(all);
+        let places: Vec<usize> = if some.is_some() { (0..frames.len()).collect() } else { frames.to_vec() };
         let mut run = Run::new(basis, &used.ks);
         for first in (0..voxels).step_by(RUN) {
             let count = RUN.min(voxels - first);
             run.load(self, voxels, first, count);
             run.invert(basis, count.div_ceil(LANES));
-            (0..basis.frames()).for_each(|frame| visit(frame * voxels + first, &run.frame(frame)[..count]));
+            for (frame, place) in frames.iter().zip(&places) {
+                visit(frame * voxels + first, &run.frame(*place)[..count]);
+            }
         }
     }
 
     /// As [`Self::for_each_run`], if the coefficients are the samples.
-    pub(super) fn for_each_run_of_samples(&self, count: usize, mut visit: impl FnMut(usize, &[f64])) {
+    pub(super) fn for_each_run_of_samples(
+        &self,
+        voxels: usize,
+        frames: &[usize],
+        mut visit: impl FnMut(usize, &[f64]),
+    ) {
         let mut run = [0.0; 8 * RUN];
-        for first in (0..count).step_by(run.len()) {
-            let run = &mut run[..(8 * RUN).min(count - first)];
-            self.load(first, run);
-            visit(first, run);
+        for (frame, first) in frames.iter().flat_map(|frame| (0..voxels).step_by(8 * RUN).map(move |at| (frame, at))) {
+            let run = &mut run[..(8 * RUN).min(voxels - first)];
+            self.load(frame * voxels + first, run);
+            visit(frame * voxels + first, run);
         }
     }
 

@@ -14,6 +14,7 @@ pub mod decode;
 pub mod encode;
 mod error_weights;
 pub mod field;
+mod listed;
 mod gain;
 mod load;
 pub(crate) mod pyramid;
@@ -58,6 +59,8 @@ pub struct WindowCodec {
     pub clip: Option<(f64, f64)>,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
+    /// Whether blocks may list their values.
+    pub lists: bool,
     /// The level of detail: blocks are decoded on the lattice of every 2^lod-th voxel along each axis.
     pub lod: u32,
     /// The tier of the blocks that are coded or decoded.
@@ -84,7 +87,20 @@ impl WindowCodec {
         let levels = wavelet::ranges(levels);
         let (basis, synthesis) = (Arc::from(basis), Arc::new(synthesis));
         let scheme = Arc::new(scheme);
-        Self { scheme, basis, synthesis, gain, sample, bound, missing_value: None, clip: None, levels, lod: 0, tier: 0 }
+        Self {
+            scheme,
+            basis,
+            synthesis,
+            gain,
+            sample,
+            bound,
+            missing_value: None,
+            clip: None,
+            levels,
+            lists: false,
+            lod: 0,
+            tier: 0,
+        }
     }
 
     /// Creates the codec of a window in a coefficient file; an error if the window contradicts its basis.

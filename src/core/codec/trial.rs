@@ -2,6 +2,7 @@
 
 use super::WindowCodec;
 use super::block_with_ghosts::BlockWithGhosts;
+use super::encode::listed;
 use super::error_weights::QuantizerSetup;
 use super::load::Missing;
 use super::pyramid::Nodes;
@@ -54,6 +55,12 @@ impl<'a, R: Real> Trial<'a, R> {
     /// scheme.
     pub fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid, scratch: &mut Scratch<R>) -> usize {
         self.coded(codec, pyramid, scratch).unwrap_or(self.samples.len())
+    }
+
+    /// About the bytes of the box by its list of values; none if it may not be listed, or if that takes no less than `bytes`.
+    pub fn listed_bytes(&self, codec: &WindowCodec, bytes: usize, scratch: &mut Scratch<R>) -> Option<usize> {
+        let listed = listed(codec, self.size, &self.samples, bytes)?;
+        Some(listed.estimate(&mut scratch.codes)).filter(|listed| *listed < bytes)
     }
 
     /// As [`Self::bytes`]; none if the box must be stored exactly.

@@ -99,6 +99,12 @@ impl TimeBasis for Learned {
         let rows = self.rows.iter().zip(marked).filter(|(_, marked)| **marked).map(|(row, _)| row.clone());
         Some(Box::new(Self::from_rows(rows.collect(), self.frames)))
     }
+
+    fn only_frames(&self, frames: &[usize]) -> Option<Box<dyn TimeBasis>> {
+        let some = |row: &Vec<f64>| frames.iter().map(|frame| row[*frame]).collect();
+        let is_part = (1..self.frames).contains(&frames.len());
+        is_part.then(|| Box::new(Self::from_rows(self.rows.iter().map(some).collect(), frames.len())) as _)
+    }
 }
 
 /// out_i = sum over j of `factors[i][j]` times lane j, from the first j to the last (eq 5, or its transpose).

@@ -77,6 +77,11 @@ pub trait TimeBasis: Send + Sync + Debug {
     fn only(&self, _marked: &[bool]) -> Option<Box<dyn TimeBasis>> {
         None
     }
+
+    /// A basis whose inverse gives only some frames, one after another, with the same bits; none if that saves nothing.
+    fn only_frames(&self, _frames: &[usize]) -> Option<Box<dyn TimeBasis>> {
+        None
+    }
 }
 
 /// Creates the basis of a window of `frames` frames; `functions` are the learned ones, if any (`Learned::new`).

@@ -1,18 +1,18 @@
 //! Chooses the scheme of a window: the one that makes some of its boxes smallest.
 //!
 //! Candidates are a learned basis along time (eq 20) with a pyramid in space, pyramids in space and time (eq 32) whose passes
-//! along time come first or last, and pyramids in space alone, frame by frame. The first suits slow change and noise, the
-//! others fronts and moving things, the last those that move by more than their size from frame to frame. Axes come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
+//! along time come first or last, pyramids in space alone, frame by frame, and pyramids in time alone, voxel by voxel. The first
+//! suits slow change and noise, the next two fronts and moving things, space alone what moves by more than its size from frame to
+//! frame, time alone series that have nothing to do with each other. Axes come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
 //! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33), the growth of steps (eq 34) and ghost
 //! nodes.
 
 use super::learn::learned_functions;
 use super::smoothness::{AXES, roughest_first};
 use super::spread::evenly;
-use super::{ConvertConfig, Pool};
+use super::{ConvertConfig, Pool, SchemeConstraint, SpatialPredictor};
 use rayon::prelude::*;
-use std::sync::{Mutex, PoisonError};
-use wavesplat_core::base::choice::Choice;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
@@ -25,51 +25,6 @@ use wavesplat_core::codec::trial::{Scratch, Trial};
 use wavesplat_core::source::{Archive, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Basis;
 use wavesplat_format::Packing;
-
-/// The fixed parts of a scheme; the rest is chosen for each window.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SchemeConstraint {
-    /// The transform along time; none allows any.
-    pub basis: Option<Basis>,
-    /// The pyramid.
-    pub space: SpatialPredictor,
-}
-
-/// How coefficients are predicted in space, or samples in space and time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SpatialPredictor {
-    /// A pyramid with whichever stencil suits.
-    Any,
-    /// No prediction: every series is coded by itself.
-    Alone,
-    /// A pyramid with this stencil.
-    Pyramid(Stencil),
-}
-
-impl Choice for SpatialPredictor {
-    const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
-        ("none", Self::Alone, "No prediction: each series by itself"),
-        ("linear", Self::Pyramid(Stencil::Linear), "From two neighbours along an axis"),
-        ("cubic", Self::Pyramid(Stencil::Cubic), "From four neighbours along an axis"),
-        ("auto", Self::Any, "linear or cubic, whichever makes a few sample boxes smaller"),
-    ];
-}
-
-impl SchemeConstraint {
-    /// No constraint: everything is chosen.
-    pub const AUTO: Self = Self { basis: None, space: SpatialPredictor::Any };
-}
-
-impl From<Basis> for SchemeConstraint {
-    /// The bases of [Dobashi](wavesplat_core::bibliography) along time alone, others with a pyramid.
-    fn from(basis: Basis) -> Self {
-        let space = match basis {
-            Basis::Haar | Basis::Multi => SpatialPredictor::Alone, // the published method, for comparisons
-            Basis::Samples | Basis::Learned => SpatialPredictor::Any, // only a pyramid makes these files small
-        };
-        Self { basis: Some(basis), space }
-    }
-}
 
 /// The largest number of samples in all boxes, for blocks of `block` samples.
 pub(super) fn most_samples(block: usize) -> usize {
@@ -97,6 +52,8 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) edge: usize,
     /// How the file's codes are packed.
     pub(super) packing: Packing,
+    /// Whether blocks may list their values.
+    pub(super) lists: bool,
     /// The tiers above the blocks of a window with a pyramid.
     pub(super) tiers: u8,
     /// The previous window's scheme, if the choice may start from it.
@@ -169,16 +126,33 @@ impl SchemeSelector<'_> {
         }
         let tuned = promising.map(|f| self.coarsest(f, &trials));
         let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
-        for variants in [Self::orders, Self::stencils, Self::growths, Self::ghosts] {
+        let variants = [Self::orders, Self::stencils, Self::growths, Self::ghosts, Self::linear_orders];
+        for variants in variants {
             let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
             best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
         }
         Ok(self.finished(best.1, trials))
     }
 
+    /// Whether most samples take less by lists of their values than by a scheme: then no blocks are above others.
+    fn is_listed<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> bool {
+        let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return false };
+        let codec = self.with_scheme(scheme, of_basis);
+        let mut scratch = trials.idle.take().unwrap_or_default();
+        let mut is_listed = |b: &&Trial<'_, R>| {
+            let coded = b.bytes(&codec, pyramid, &mut scratch);
+            b.listed_bytes(&codec, coded, &mut scratch).is_some()
+        };
+        let listed: usize = of_basis.boxes.iter().filter(&mut is_listed).map(Trial::voxels).sum();
+        2 * listed > of_basis.boxes.iter().map(Trial::voxels).sum()
+    }
+
     /// The codec of the chosen scheme.
-    fn finished<R>(&self, mut scheme: Scheme, trials: Trials<'_, R>) -> WindowCodec {
-        scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = self.tiers);
+    fn finished<R: Real + Send + Sync>(&self, mut scheme: Scheme, trials: Trials<'_, R>) -> WindowCodec {
+        let is_in_space = scheme.pyramid.as_ref().is_some_and(|p| p.order.iter().any(|axis| *axis != Axis::T));
+        let has_tiers = self.tiers > 0 && is_in_space && !(self.lists && self.is_listed(&scheme, &trials));
+        scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = if has_tiers { self.tiers } else { 0 });
         let of_basis = trials.boxes.into_iter().find(|b| b.basis == scheme.basis);
         match of_basis {
             Some(of_basis) => {
@@ -314,9 +288,7 @@ impl SchemeSelector<'_> {
             found.push(Scheme { basis, functions, pyramid, coarseness: self.coarseness(COARSE) });
         }
         if basis.is_none_or(|b| b == Basis::Samples) {
-            let time_first = [&[Axis::T], &in_space[..]].concat();
-            let time_last = [&in_space[..], &[Axis::T]].concat();
-            for order in [time_first, time_last, in_space] {
+            for order in self.orders_of_samples(&in_space) {
                 let (coarseness, pyramid) = (self.coarseness(1.0), Some(self.pyramid(&order, stencil)));
                 found.push(Scheme { pyramid, coarseness, ..Scheme::along_time(Basis::Samples) });
             }
@@ -331,6 +303,17 @@ impl SchemeSelector<'_> {
             found.dedup();
         }
         Ok(found)
+    }
+
+    /// Where samples may be refined along time: before the axes in space, after them, not at all, or alone.
+    fn orders_of_samples(&self, in_space: &[Axis]) -> Vec<Vec<Axis>> {
+        let (time_first, time_last) = ([&[Axis::T], in_space].concat(), [in_space, &[Axis::T]].concat());
+        let mut orders = vec![time_first, time_last, in_space.to_vec()];
+        let voxels = self.archive.grid.whole().voxels();
+        if self.frames() > 1 && voxels <= FEW_SERIES {
+            orders.push(vec![Axis::T]);
+        }
+        orders
     }
 
     /// The learned functions, from rows all over the volume instead of the boxes used for trials.
@@ -377,7 +360,7 @@ impl SchemeSelector<'_> {
     fn orders(&self, best: &Scheme) -> Vec<Scheme> {
         let swapped = |p: &Pyramid| {
             let mut order = p.order.clone();
-            let last = order.len() - 1;
+            let Some(last) = order.len().checked_sub(1).filter(|last| *last > 0) else { return Vec::new() };
             order.swap(last - 1, last);
             vec![Pyramid { order, ..p.clone() }]
         };
@@ -391,6 +374,22 @@ impl SchemeSelector<'_> {
             }
             _ => Vec::new(),
         }
+    }
+
+    /// All orders of samples if the linear stencil is the best: families were compared with the other one.
+    fn linear_orders(&self, best: &Scheme) -> Vec<Scheme> {
+        let is_linear = |p: &Pyramid| p.stencil == Stencil::Linear && p.order != [Axis::T];
+        if !best.pyramid.as_ref().is_some_and(is_linear)
+            || best.basis != Basis::Samples
+            || self.config.coding.space != SpatialPredictor::Any
+        {
+            return Vec::new();
+        }
+        let of_order = |p: &Pyramid, order| Pyramid { order, ..p.clone() };
+        variants(best, |p| {
+            let in_space: Vec<Axis> = p.order.iter().copied().filter(|axis| *axis != Axis::T).collect();
+            self.orders_of_samples(&in_space).into_iter().map(|order| of_order(p, order)).collect()
+        })
     }
 
     fn growths(&self, best: &Scheme) -> Vec<Scheme> {
@@ -407,9 +406,7 @@ impl SchemeSelector<'_> {
     fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
         let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
         let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
-        let mut codec = of_basis.codec.lock().unwrap_or_else(PoisonError::into_inner);
-        codec.scheme = scheme.clone().into(); // with the same functions
-        let codec = &*codec;
+        let codec = &*self.with_scheme(scheme, of_basis);
         let bytes = |b: &Trial<'_, R>| {
             let mut scratch = trials.idle.take().unwrap_or_default();
             let bytes = b.bytes(codec, pyramid, &mut scratch);
@@ -421,10 +418,18 @@ impl SchemeSelector<'_> {
         bytes as f64 * whole as f64 / voxels as f64 + bytes_of_functions(scheme)
     }
 
+    /// The codec of a scheme with the same functions as those of a transform along time.
+    fn with_scheme<'a, R>(&self, scheme: &Scheme, of_basis: &'a Transformed<'_, R>) -> MutexGuard<'a, WindowCodec> {
+        let mut codec = of_basis.codec.lock().unwrap_or_else(PoisonError::into_inner);
+        codec.scheme = scheme.clone().into();
+        codec
+    }
+
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.frames();
         let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, self.edge);
         codec.missing_value = self.config.missing_value;
+        codec.lists = self.lists;
         codec
     }
 }
@@ -470,6 +475,9 @@ const PROMISING: f64 = 1.3;
 /// A variant is used only if it makes boxes smaller by this factor: smaller gains do not carry over to blocks, which
 /// are larger.
 const CLEARLY: f64 = 0.99;
+
+/// The most voxels whose series are refined along time alone: that leaves no coarse lattices to read.
+const FEW_SERIES: usize = 256;
 
 /// The shrinkage of steps of coarser levels, and its limit; the choice begins with the first.
 const GROWTHS: [(f64, f64); 3] = [(1.5, 3.0), (1.0, 1.0), (2.0, 4.0)];

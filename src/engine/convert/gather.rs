@@ -111,12 +111,12 @@ impl<'a> WindowReader<'a> {
             Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
             _ => Vec::new(),
         };
-        // Without a pyramid, readers of version 1.0 suffice.
         let packing = if config.has_pyramids() { Packing::default() } else { Packing::Flat };
         let features = done.features.unwrap_or(Features {
             packing,
             described: archive.description.is_some(),
             tiered: plan.tiers > 0,
+            listed: config.lists(),
         });
         let (id, range, scheme) = (done.id, None, None);
         Self {
@@ -242,6 +242,7 @@ impl<'a> WindowReader<'a> {
             most: if self.is_rough { most / ROUGH } else { most },
             edge: self.plan.blocks.edges[0],
             packing: self.features.packing,
+            lists: self.features.listed,
             tiers: if self.features.tiered { self.plan.tiers } else { 0 },
             before,
         };

@@ -18,6 +18,7 @@
 mod choose;
 mod coarse;
 mod coded_input;
+mod coding;
 pub mod estimate;
 mod gather;
 mod learn;
@@ -38,9 +39,9 @@ mod variation;
 mod warnings;
 
 use crate::file::report::{BoundReport, WindowReport};
-pub use choose::{SchemeConstraint, SpatialPredictor};
 use coarse::CoarseBlocks;
 use coded_input::CodedInput;
+pub use coding::{BestFor, SchemeConstraint, SpatialPredictor};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use gather::{Batch, BlockSamples};
 pub use max_error::MaxError;
@@ -181,7 +182,12 @@ impl ConvertConfig {
 
     /// Whether windows may have pyramids.
     fn has_pyramids(&self) -> bool {
-        self.coding.space != SpatialPredictor::Alone && self.tolerance > 0.0
+        self.lists() && self.tolerance > 0.0
+    }
+
+    /// Whether blocks may list their values: not under the published method.
+    fn lists(&self) -> bool {
+        self.coding.space != SpatialPredictor::Alone
     }
 }
 

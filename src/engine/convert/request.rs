@@ -2,7 +2,7 @@
 
 use super::plan::check_max_error;
 use super::shard::{ArchiveScan, Shard, sharded};
-use super::{CHAIN, ConvertConfig, MaxError, MissingPolicy, SchemeConstraint, SpatialPredictor};
+use super::{BestFor, CHAIN, ConvertConfig, MaxError, MissingPolicy, SchemeConstraint, SpatialPredictor};
 use serde::{Deserialize, Deserializer, de::Error as _};
 use std::path::PathBuf;
 use wavesplat_core::base::choice;
@@ -46,6 +46,9 @@ pub struct ConvertRequest {
     /// Prediction in space: none (for haar, multi and learned), linear, cubic or auto. Default: what suits the basis.
     #[serde(with = "choice::optional")]
     pub space: Option<SpatialPredictor>,
+    /// What the file is made best for; it sets `window` and `block` where they are not given. Default: all.
+    #[serde(with = "choice::optional")]
+    pub best_for: Option<BestFor>,
     /// Frames in a window. Default: 32, up to 1024 for at most 256 voxels; one more for the basis multi.
     pub window: Option<usize>,
     /// Voxels a side of a block. Default: as many as suit the window.
@@ -77,6 +80,7 @@ impl Default for ConvertRequest {
             transfer_function: None,
             basis: None,
             space: None,
+            best_for: None,
             window: None,
             block: None,
             level: 3,
@@ -151,10 +155,11 @@ impl ConvertRequest {
         let missing = if is_declared { MissingPolicy::Mask } else { MissingPolicy::Error };
         let of_variable = |error: &MaxError| error.for_variable(archive.variable.as_deref());
         let defaults = ConvertConfig::new(self.tolerance.unwrap_or(TOLERANCE));
+        let window = self.window.unwrap_or_else(|| self.usual_window(defaults.window, archive.grid));
         Ok(ConvertConfig {
             coding: self.coding(),
             chain: self.chain,
-            window: self.window.unwrap_or_else(|| self.usual_window(defaults.window, archive.grid)),
+            window,
             max_error: self.max_error.as_ref().map(of_variable).transpose()?,
             bound: self.bound,
             range: self.range,
@@ -162,7 +167,7 @@ impl ConvertRequest {
             missing_value: archive.missing_value(self.missing_value),
             clip: self.clip,
             colours: self.transfer_function.clone(),
-            block: self.block,
+            block: self.block.or_else(|| self.best_for?.block(archive.grid.dims, window)),
             level: self.level,
             memory: self.memory,
             settings: self.input.clone(),
@@ -173,7 +178,8 @@ impl ConvertRequest {
     /// The default window: longer for a few series, which are small and predict each other little.
     fn usual_window(&self, usual: usize, grid: Grid) -> usize {
         let is_short = |window: &usize| window.saturating_mul(grid.whole().voxels()) <= FEW_SAMPLES;
-        let window = [1024, 512, 256, 128, 64].into_iter().find(is_short).unwrap_or(usual);
+        let usual = [1024, 512, 256, 128, 64].into_iter().find(is_short).unwrap_or(usual);
+        let window = self.best_for.map_or(usual, |best_for| best_for.window(usual));
         window + usize::from(self.basis == Some(Basis::Multi))
     }
 

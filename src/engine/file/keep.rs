@@ -6,6 +6,7 @@ use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
+use wavesplat_core::codec::decode::WantedFrames;
 use wavesplat_format::BlockEntry;
 
 impl CoefficientFile {
@@ -51,30 +52,32 @@ impl CoefficientFile {
         Ok(block)
     }
 
-    /// The samples of a block in all frames of its window, and the stored bytes read. Only the frames for which the
-    /// coefficients in `wanted` suffice are valid. Uses the cache, and adds blocks that are read again. If the caller needs
-    /// only a part of the block (`is_part`), the cache takes it at the first read.
+    /// The samples of a block, `frame * voxels + voxel`, and the stored bytes read. Only `wanted` frames have their samples. Uses the
+    /// cache, and adds blocks that are read again. If the caller needs only a part of the block (`is_part`), the cache takes it at the
+    /// first read.
     pub fn samples(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        wanted: &[bool],
+        wanted: &WantedFrames,
         is_part: bool,
     ) -> Result<(Arc<Buffer<u8>>, u64)> {
-        let decode = |wanted: &[bool]| {
-            self.block(codec, entry, wanted).map(|block| (Arc::new(block.samples(codec)), block.bytes_read))
+        let decode = |wanted: &WantedFrames| {
+            let block = self.block(codec, entry, &wanted.coefficients)?;
+            Ok((Arc::new(block.samples_of(codec, wanted)), block.bytes_read))
         };
         let Some(kept) = &self.kept else { return decode(wanted) };
         let key = self.key(entry, DecodedForm::Samples);
         if let Some(samples) = kept.samples(&key) {
             return Ok((samples, 0));
         }
-        let (is_again, is_whole) = (kept.is_read_again(entry.id, self.lod), wanted.iter().all(|wanted| *wanted));
+        let is_whole = wanted.coefficients.iter().all(|wanted| *wanted);
+        let is_again = kept.is_read_again(entry.id, self.lod);
         let is_kept = is_again || is_part && is_whole;
         if !is_kept {
             return decode(wanted);
         }
-        let (samples, bytes_read) = decode(&vec![true; wanted.len()])?;
+        let (samples, bytes_read) = decode(&WantedFrames::all(codec))?;
         kept.keep_samples(key, &samples);
         Ok((samples, bytes_read))
     }

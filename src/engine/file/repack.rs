@@ -42,7 +42,8 @@ pub fn repack(
     let metadata = nested(file.metadata());
     let first_digest = metadata.windows.first().map_or(0, |window| window.digest);
     let description = file.description()?;
-    let features = Features { described: description.is_some(), ..metadata.features() };
+    let (packing, described) = (metadata.features().packing, description.is_some());
+    let features = Features { packing, described, ..file.reader.features() };
     let id = metadata.file_id(first_digest, features).map_err(failed)?;
     let mut writer = Writer::with_features(out, id, &metadata, features).map_err(failed)?;
     let at_once = blocks_within(memory, 0, |_| 0, file.block_bytes(), "rewriting")?;

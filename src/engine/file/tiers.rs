@@ -68,7 +68,7 @@ impl CoefficientFile {
     }
 
     /// The decoded nodes of a block above others, kept or decoded now.
-    fn field(&self, codec: &WindowCodec, id: BlockId, wanted: Vec<bool>) -> Result<Arc<Field<'static>>> {
+    pub(super) fn field(&self, codec: &WindowCodec, id: BlockId, wanted: Vec<bool>) -> Result<Arc<Field<'static>>> {
         let key = AboveKey { id, lod: codec.lod, wanted };
         self.above.field(&key, || {
             let (entry, above) = (self.entry_above(id)?, self.above(codec, id, &key.wanted)?);

@@ -321,7 +321,13 @@ fn original(
 
 /// Checks that no coefficient is larger than the directory states; skipping of parts relies on this.
 fn check_coefficients(file: &CoefficientFile, entry: &BlockEntry, block: &Block, codec: &WindowCodec) -> Result<()> {
-    let largest_of_parts = block.largest(codec);
+    if entry.parts.iter().all(|part| !matches!(part.kind, PartKind::Level(_))) {
+        return Ok(());
+    }
+    let largest_of_parts = match entry.id.tier {
+        0 => block.largest(codec, &block.field(codec)),
+        _ => block.largest(codec, &*file.field(codec, entry.id, vec![true; codec.basis.coefficients()])?),
+    };
     for part in &entry.parts {
         let PartKind::Level(level) = part.kind else { continue };
         let largest = largest_of_parts[usize::from(level)];

@@ -24,9 +24,9 @@ fn add(
     piece: &Piece,
     frames: &[usize],
 ) -> Result<()> {
-    let InWindow { window, codec, wanted, .. } = InWindow::new(file, frames)?;
+    let InWindow { window, codec, wanted } = InWindow::new(file, frames)?;
     for entries in file.entries(window, channel, &piece.region) {
-        entries?.iter().try_for_each(|entry| prefetch.add(&codec, entry, &wanted))?;
+        entries?.iter().try_for_each(|entry| prefetch.add(&codec, entry, &wanted.coefficients))?;
     }
     Ok(())
 }

@@ -23,6 +23,7 @@ use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::memory;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::decode::WantedFrames;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_format::BlockEntry;
 
@@ -252,18 +253,15 @@ struct Target {
 struct InWindow {
     window: u32,
     codec: WindowCodec,
-    /// Their numbers in the window.
-    frames: Vec<usize>,
-    /// The coefficients that they need.
-    wanted: Vec<bool>,
+    wanted: WantedFrames,
 }
 
 impl InWindow {
     fn new(file: &CoefficientFile, frames: &[usize]) -> Result<Self> {
         let window = file.window_of(frames[0]);
         let (codec, first) = (file.codec(window)?, file.window_range(window).start);
-        let frames: Vec<usize> = frames.iter().map(|frame| frame - first).collect();
-        Ok(Self { window, wanted: wavesplat_core::wavelet::needed(&codec.synthesis, &frames), codec, frames })
+        let wanted = WantedFrames::new(&codec, frames.iter().map(|frame| frame - first).collect());
+        Ok(Self { window, codec, wanted })
     }
 }
 
@@ -277,22 +275,22 @@ fn read_window(
     out: &mut [u8],
     report: &mut ExtractReport,
 ) -> Result<()> {
-    let InWindow { window, codec, frames, wanted } = InWindow::new(file, frames)?;
+    let InWindow { window, codec, wanted } = InWindow::new(file, frames)?;
     let is_part = frames.len() < codec.frames() || target.region != file.grid.whole();
     let out = Mutex::new(out);
     let read = |entry: &BlockEntry| {
         let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
         let region = file.blocks.region(entry.id.block as usize);
         let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
-        target.copy(&codec, &frames, &region, &samples, &mut out);
+        target.copy(&codec, &wanted.frames, &region, &samples, &mut out);
         Ok(bytes_read)
     };
     for entries in file.entries(window, channel, &target.region) {
         let entries = entries?;
         for group in file.by_shared(&entries) {
-            file.fetch_blocks(&codec, group.iter().copied(), &wanted)?;
+            file.fetch_blocks(&codec, group.iter().copied(), &wanted.coefficients)?;
             let decoded_now = group.iter().copied().filter(|entry| !file.keeps_samples(entry));
-            file.decode_shared(&codec, decoded_now, &wanted)?;
+            file.decode_shared(&codec, decoded_now, &wanted.coefficients)?;
             let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
             for some in group.chunks(if is_any { group.len() } else { at_once }) {
                 report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
@@ -307,13 +305,15 @@ impl Target {
     /// Copies the rows shared by a block and the piece.
     fn copy(&self, codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], out: &mut [u8]) {
         let (size, shared) = (codec.sample.size(), block.intersect(&self.region));
-        let row = shared.dims()[0] * size;
+        let ([nx, ny, nz], [bx, by, _]) = (shared.dims(), block.dims());
+        let [along_x, along_y, along_z] = [0, 1, 2].map(|axis| self.strides.along(axis));
         for (to_frame, from_frame) in frames.iter().enumerate() {
-            for (y, z) in shared.rows() {
-                let voxel = [shared.start[0], y, z];
-                let from = (from_frame * block.voxels() + block.index(voxel)) * size;
-                let to = self.strides.place(self.first + to_frame, voxel);
-                copy_row(&samples[from..from + row], size, to, self.strides.along_x(), out);
+            let from = from_frame * block.voxels() + block.index(shared.start);
+            let to = self.strides.place(self.first + to_frame, shared.start) as isize;
+            for (z, y) in (0..nz).flat_map(|z| (0..ny).map(move |y| (z, y))) {
+                let row = &samples[(from + bx * (y + by * z)) * size..][..nx * size];
+                let to = to + y as isize * along_y + z as isize * along_z;
+                copy_row(row, size, to as usize, along_x, out);
             }
         }
     }

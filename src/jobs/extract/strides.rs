@@ -39,10 +39,10 @@ impl Strides {
         self.frame * frame + (0..3).map(|axis| self.voxel[axis] * along(axis)).sum::<usize>()
     }
 
-    /// The signed step from a voxel to the next along x.
-    pub(super) fn along_x(&self) -> isize {
-        let step = self.voxel[0] as isize;
-        if self.descending[0] { -step } else { step }
+    /// The signed step from a voxel to the next along an axis.
+    pub(super) fn along(&self, axis: usize) -> isize {
+        let step = self.voxel[axis] as isize;
+        if self.descending[axis] { -step } else { step }
     }
 }
 
@@ -64,6 +64,6 @@ mod tests {
         let order = SampleOrder::of_source(&Description { dimensions, axes, ..Description::default() });
         let strides = Strides::new(&order, 4, &Region { start: [1, 2, 3], end: [4, 4, 5] });
         assert_eq!((strides.place(3, [3, 2, 3]), strides.place(0, [1, 3, 4])), (3, 4 * 2 + 12 + 24));
-        assert_eq!((strides.frame, strides.along_x()), (1, -4));
+        assert_eq!((strides.frame, strides.along(0)), (1, -4));
     }
 }

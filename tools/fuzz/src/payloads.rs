@@ -20,12 +20,13 @@ pub fn codes(data: &[u8]) {
     assert_eq!(back, codes);
 }
 
-/// Codes on lattices, of at most 3 boxes with at most 12 codes along an axis.
+/// Codes on lattices, of at most 3 boxes with at most 12 codes along an axis, and samples of the first box by their values.
 pub fn cells(data: &[u8]) {
     let mut input = Input::new(data);
     let mut extents = |_| [(); 4].map(|()| input.below(13));
     let boxes: Vec<[usize; 4]> = (0..3).map(&mut extents).filter(|extents| !extents.contains(&0)).collect();
     let volume = boxes.iter().map(|extents| extents.iter().product::<usize>()).sum();
+    let first = boxes.first().copied();
     let boxes: Vec<CodeBox> = boxes.into_iter().map(CodeBox::contiguous).collect();
     let packing = [Packing::Flat, Packing::Nested][input.below(2)];
     let mut codes = vec![-1; volume];
@@ -33,9 +34,29 @@ pub fn cells(data: &[u8]) {
         assert_eq!(count, nonzero(&codes));
         cells_round_trip(packing, &codes, &boxes);
     }
+    first.into_iter().for_each(|extents| listed(input.rest(), extents));
     let mut codes = numbers(input.rest());
     codes.resize(volume, 0);
     cells_round_trip(packing, &codes, &boxes);
+}
+
+/// Bytes as a payload of listed samples, and as samples.
+fn listed(raw: &[u8], extents: [usize; 4]) {
+    for size in [1, 2, 4, 8] {
+        if let Ok(samples) = unpack_listed(raw, size, extents) {
+            listed_round_trip(&samples, size, extents);
+        }
+        if let Some(samples) = raw.get(..size * extents.iter().product::<usize>()) {
+            listed_round_trip(samples, size, extents);
+        }
+    }
+}
+
+fn listed_round_trip(samples: &[u8], size: usize, extents: [usize; 4]) {
+    let listed = Listed::new(samples, size, extents).expect("few values");
+    let (mut codes, mut raw) = (Vec::new(), Vec::new());
+    listed.pack(&mut codes, &mut raw);
+    assert_eq!(unpack_listed(&raw, size, extents).expect("packed"), samples);
 }
 
 fn cells_round_trip(packing: Packing, codes: &[i32], boxes: &[CodeBox]) {

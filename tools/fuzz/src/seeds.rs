@@ -4,7 +4,7 @@ use super::forge::Seed;
 use std::sync::OnceLock;
 
 /// Their names and bytes, as `tools/tests/fuzz.rs` makes them.
-pub const SEEDS: [(&str, &[u8]); 10] = [
+pub const SEEDS: [(&str, &[u8]); 11] = [
     ("haar", include_bytes!("../seeds/haar.wspl")),
     ("multi", include_bytes!("../seeds/multi.wspl")),
     ("learned", include_bytes!("../seeds/learned.wspl")),
@@ -15,6 +15,7 @@ pub const SEEDS: [(&str, &[u8]); 10] = [
     ("nested", include_bytes!("../seeds/nested.wspl")),
     ("ghosts", include_bytes!("../seeds/ghosts.wspl")),
     ("tiers", include_bytes!("../seeds/tiers.wspl")),
+    ("listed", include_bytes!("../seeds/listed.wspl")),
 ];
 
 /// A file by its number, modulo how many there are.

@@ -34,6 +34,13 @@ def test_the_bytes_of_the_program(tmp_path, samples):
     )
 
 
+def test_best_for(tmp_path, samples):
+    np.save(tmp_path / "a.npy", samples)
+    run("convert", tmp_path / "a.npy", "-o", tmp_path / "a.wspl", "--best-for", "series", "-q")
+    wavesplat.convert(samples, tmp_path / "b.wspl", best_for="series")
+    assert (tmp_path / "b.wspl").read_bytes() == (tmp_path / "a.wspl").read_bytes()
+
+
 class Sliced:
     """An array that can only be sliced, such as Zarr's or h5py's."""
 
@@ -62,6 +69,7 @@ def test_pictures_are_volumes_of_one_layer(tmp_path):
         ({"variable": "u"}, "Dataset"),
         ({"times": [0.0, 1.0]}, "times"),
         ({"window": 0}, "window"),
+        ({"best_for": "speed"}, "best_for"),
         ({"memory": 1000}, "memory"),
         ({"range": (1, 0)}, "range"),
     ],

@@ -19,7 +19,7 @@ pub(super) struct Original {
 /// Has windows of all bases, with and without a pyramid and tiers, two channels, times, outliers, missing and exact samples, and a lost
 /// block.
 pub(super) fn fat() -> Original {
-    original([5, 3, 2], 2, 8, Packing::Nested)
+    original([5, 3, 2], 2, 13, Packing::Nested)
 }
 
 /// Like [`fat`], with fewer voxels and one channel.
@@ -168,7 +168,9 @@ fn fat_files_have_every_feature() {
         let has = |kind| blocks.values().any(|(entry, _)| of(&entry.id) && entry.part(kind).is_some());
         assert!(kinds.iter().all(|kind| has(*kind)), "{:?}", kinds.map(has));
     }
-    assert!(blocks.values().any(|(entry, _)| entry.part(PartKind::Level(3)).is_some()));
+    for kind in [PartKind::Level(3), PartKind::Listed] {
+        assert!(blocks.values().any(|(entry, _)| entry.part(kind).is_some()), "{kind}");
+    }
     assert_eq!(blocks.values().filter(|(entry, _)| entry.lost).count(), 1);
     assert_eq!(recover(&file).expect("whole").0, file);
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_engine::convert::shard::Shard;
-use wavesplat_engine::convert::{Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
+use wavesplat_engine::convert::{BestFor, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
 use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::open_colours;
 
@@ -109,6 +109,9 @@ pub(crate) struct ConvertArgs {
     /// Prediction of coefficients in space [default: none for haar and multi, else auto]
     #[arg(long, value_parser = choice::<SpatialPredictor>(), help_heading = CODING)]
     space: Option<SpatialPredictor>,
+    /// What the file is made best for, by --window and --block where they are not given [default: all]
+    #[arg(long, value_name = "WHAT", value_parser = choice::<BestFor>(), help_heading = CODING)]
+    best_for: Option<BestFor>,
     /// Frames in a window: a power of two for haar, one more for multi [default: 32; up to 1024 for 256 voxels or less]
     #[arg(long, value_name = "T", help_heading = CODING)]
     window: Option<usize>,
@@ -198,6 +201,7 @@ impl ConvertArgs {
             transfer_function: colours.transpose()?,
             basis: self.basis,
             space: self.space,
+            best_for: self.best_for,
             window: self.window,
             block: self.block,
             level: self.level,

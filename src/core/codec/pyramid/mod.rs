@@ -335,6 +335,9 @@ impl<'a> PredictionPasses<'a> {
         field: &[R],
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
+        if !parts.contains(&true) {
+            return changes;
+        }
         let mut rest = Buffer::with_len(self.pyramid_nodes());
         let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
         for (number, nodes) in pyramids.filter(|(_, nodes)| !rows::is_zero(nodes)) {

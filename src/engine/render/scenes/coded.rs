@@ -7,7 +7,7 @@ use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
-use wavesplat_core::codec::decode::Block;
+use wavesplat_core::codec::decode::{Block, WantedFrames};
 use wavesplat_core::codec::field::Field;
 
 /// A decoded block of a file.
@@ -23,7 +23,7 @@ pub(super) struct CodedBlock<'a> {
 
 /// The dense values of a block.
 enum Dense {
-    /// Decoded samples of all frames of the window.
+    /// Decoded samples of the plan's frames: `frame * voxels + voxel` in the window.
     Samples(Buffer<u8>),
     /// Values of the plan's frames, computed from the coefficients: `frame * voxels + voxel`; empty if all are zero.
     Values(Vec<f64>),
@@ -36,7 +36,8 @@ impl<'a> CodedBlock<'a> {
     pub(super) fn new(plan: &'a BatchPlan, decoded: Arc<DecodedBlock>, errors: Vec<f64>) -> Self {
         let DecodedBlock { block, field } = decoded.as_ref();
         if block.exact.is_some() || plan.what == SplatSource::Samples {
-            let dense = Dense::Samples(block.samples(&plan.codec));
+            let wanted = WantedFrames::new(&plan.codec, plan.frames.clone());
+            let dense = Dense::Samples(block.samples_of(&plan.codec, &wanted));
             return Self { plan, decoded, errors, dense, few: Vec::new() };
         }
         let mut few = overrides(plan, block, field.as_ref());
@@ -153,19 +154,14 @@ fn add_coefficients(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, 
     }
 }
 
-/// Stores the values of a plan's frames by the inverse transform of all frames.
+/// Stores the values of a plan's frames by the inverse transform.
 fn put_runs(plan: &BatchPlan, block: &Block, values: &mut [f64]) {
     let mut places = vec![None; plan.codec.frames()];
     plan.frames.iter().enumerate().for_each(|(i, frame)| places[*frame] = Some(i));
-    block.for_each_run(&plan.codec, |first, mut run| {
-        let mut first = first;
-        while !run.is_empty() {
-            let (frame, voxel) = (first / block.voxels, first % block.voxels);
-            let (of_frame, rest) = run.split_at(run.len().min(block.voxels - voxel));
-            if let Some(place) = places[frame] {
-                values[place * block.voxels + voxel..][..of_frame.len()].copy_from_slice(of_frame);
-            }
-            (first, run) = (first + of_frame.len(), rest);
+    let wanted = WantedFrames::new(&plan.codec, plan.frames.clone());
+    block.for_each_run(&plan.codec, &wanted, |first, run| {
+        if let Some(place) = places[first / block.voxels] {
+            values[place * block.voxels + first % block.voxels..][..run.len()].copy_from_slice(run);
         }
     });
 }

@@ -41,7 +41,8 @@ def convert(
     origin: tuple[float, float, float] | None = None,
     resume: bool = False,
     overwrite: bool = False,
-    window: int = 32,
+    best_for: str | None = None,
+    window: int | None = None,
     chain: int = 8,
     shard: tuple[int, int] | None = None,
     block: int | None = None,
@@ -79,7 +80,9 @@ def convert(
         origin: The place of the first voxel along x, y and z, for arrays.
         resume: Whether to continue an unfinished conversion. Nothing is done if the file is complete already.
         overwrite: Whether to replace a file of this name.
-        window: Frames that are coded together.
+        best_for: What the file is made best for, by ``window`` and ``block`` where they are not given: "series" of single
+            voxels, single frames and their "pictures", or "size"; by default all of these.
+        window: Frames that are coded together; by default 32, and up to 1024 for at most 256 voxels.
         chain: Windows in a row that may share how they are coded; shards are runs of these.
         shard: (I, N) converts the I-th of N shards of a Dataset, from 1, for `wavesplat.merge`. It needs ``range`` or
             ``max_error``, since a shard does not know the range of all frames.
@@ -101,7 +104,8 @@ def convert(
         "range": None if range is None else [_finite("range", end) for end in pair("range", "(LO, HI)", range)],
         **_missing(missing),
         "clip": bool(clip),
-        "window": whole("window", window),
+        "best_for": text("best_for", best_for),
+        "window": None if window is None else whole("window", window),
         "chain": whole("chain", chain),
         "block": None if block is None else whole("block", block),
         "level": whole("level", level),

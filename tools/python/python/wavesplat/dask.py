@@ -25,6 +25,9 @@ from ._file import open as _open
 CHAIN = 256
 """Frames of a chain by default: 8 windows of 32 frames."""
 
+WINDOWS = {"series": 128, "pictures": 8}
+"""Frames in a window by what a file is made best for."""
+
 
 def convert(
     source: xr.DataArray | xr.Dataset,
@@ -67,7 +70,9 @@ def convert(
     if settings.get("range") is None and settings.get("max_error") is None:
         settings["range"] = _range(client, array, settings.get("missing"))
     frames = array.sizes[array.dims[0]]
-    chain = settings.setdefault("chain", 8) * settings.get("window", 32)
+    if settings.get("window") is None:
+        settings["window"] = WINDOWS.get(settings.get("best_for"), 32)  # shards are runs of windows
+    chain = settings.setdefault("chain", 8) * settings["window"]
     workers = max(len(client.scheduler_info()["workers"]), 1)
     shards = shards or max(min(-(-frames // chain), 4 * workers), 1)
     place = Path(folder) if folder is not None else Path(os.fspath(path) + ".shards")
