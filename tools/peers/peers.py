@@ -68,8 +68,6 @@ def largest_error(series, decoded):
 
 def measure(path, tolerances, peers, repeats):
     """Yields what is measured of each tolerance and peer."""
-    from coders import CODERS
-
     series = np.ascontiguousarray(np.load(path))
     if series.dtype.kind in "iu" and series.dtype.itemsize <= 2:
         series = series.astype(np.float32)  # exact; not all peers take integers
@@ -78,26 +76,50 @@ def measure(path, tolerances, peers, repeats):
         sys.exit(f"{path}: peers take arrays (t, z, y, x) of {taken}, this is {series.shape} {series.dtype}")
     value_range = float(series.max()) - float(series.min())
     for tolerance in tolerances:
-        bound = tolerance * value_range
         for peer in peers:
-            coder = CODERS[peer]
-            try:
-                blobs, encode_seconds = least_seconds(repeats, lambda: coder.encode(series, bound))
-            except Exception as why:  # coders raise what they like
-                print(f"{path}, {tolerance:g}, {peer}: cannot code this archive: {why}", file=sys.stderr)
-                continue
-            decode = lambda: coder.decode(blobs, series.shape, series.dtype)
-            decoded, decode_seconds = least_seconds(repeats, decode)
-            yield {
-                "data": path,
-                "tolerance": tolerance,
-                "peer": peer,
-                "bytes": sum(memoryview(blob).nbytes for blob in blobs),
-                "bound": bound,
-                "largest_error": largest_error(series, decoded),
-                "encode_seconds": encode_seconds,
-                "decode_seconds": decode_seconds,
-            }
+            bound = tolerance * value_range
+            row = in_child(lambda: {"data": path, "tolerance": tolerance, **measured(peer, series, bound, repeats)})
+            if row is None:
+                print(f"{path}, {tolerance:g}, {peer}: cannot code this archive", file=sys.stderr)
+            else:
+                yield row
+
+
+def measured(peer, series, bound, repeats):
+    """What is measured of a peer under a bound."""
+    from coders import CODERS
+
+    coder = CODERS[peer]
+    blobs, encode_seconds = least_seconds(repeats, lambda: coder.encode(series, bound))
+    decode = lambda: coder.decode(blobs, series.shape, series.dtype)
+    decoded, decode_seconds = least_seconds(repeats, decode)
+    return {
+        "peer": peer,
+        "bytes": sum(memoryview(blob).nbytes for blob in blobs),
+        "bound": bound,
+        "largest_error": largest_error(series, decoded),
+        "encode_seconds": encode_seconds,
+        "decode_seconds": decode_seconds,
+    }
+
+
+def in_child(work):
+    """What `work` returns in a process of its own, as JSON holds it; None if that fails: some coders abort."""
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            with os.fdopen(write, "w") as out:
+                json.dump(work(), out)
+        except Exception as why:  # coders raise what they like
+            print(why, file=sys.stderr, flush=True)
+            os._exit(1)
+        os._exit(0)
+    os.close(write)
+    with os.fdopen(read) as result:
+        text = result.read()
+    _, status = os.waitpid(child, 0)
+    return json.loads(text) if status == 0 else None
 
 
 def complain_unless_held(row):

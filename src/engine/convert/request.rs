@@ -149,8 +149,11 @@ impl ConvertRequest {
         Ok((source, config))
     }
 
-    /// This request, completed from an archive's description.
-    fn config(&self, archive: &Archive) -> Result<ConvertConfig> {
+    /// This request, completed from an archive's description. A scan and a shard are left out.
+    ///
+    /// # Errors
+    /// The largest errors name variables, and the archive's is not among them.
+    pub fn config(&self, archive: &Archive) -> Result<ConvertConfig> {
         let is_declared = archive.missing.is_some() || self.missing_value.is_some();
         let missing = if is_declared { MissingPolicy::Mask } else { MissingPolicy::Error };
         let of_variable = |error: &MaxError| error.for_variable(archive.variable.as_deref());

@@ -107,7 +107,7 @@ def test_wrong_shards(tmp_path):
         wavesplat.convert(array, tmp_path / "a.wspl", shard=(1, 2))
     with pytest.raises(ValueError, match="shard: takes"):
         wavesplat.convert(array, tmp_path / "a.wspl", shard=(3, 2), range=(-4, 4))
-    wavesplat.convert(array, tmp_path / "a.wspl", shard=(1, 2), range=(-4, 4), chain=1)
+    wavesplat.convert(array, tmp_path / "a.wspl", shard=(1, 2), range=(-4, 4), chain=1, window=32)
     with pytest.raises(ValueError, match="shard 2 of 2 is missing"):
         wavesplat.merge([tmp_path / "a.wspl"], tmp_path / "b.wspl")
 

@@ -104,7 +104,7 @@ def convert(
         "range": None if range is None else [_finite("range", end) for end in pair("range", "(LO, HI)", range)],
         **_missing(missing),
         "clip": bool(clip),
-        "best_for": text("best_for", best_for),
+        "best_for": _best_for(best_for),
         "window": None if window is None else whole("window", window),
         "chain": whole("chain", chain),
         "block": None if block is None else whole("block", block),
@@ -218,6 +218,12 @@ def _finite(name: str, value: Any) -> float:
     if not math.isfinite(number(name, value)):
         raise ValueError(f"{name}: takes finite numbers")
     return float(value)
+
+
+def _best_for(best_for: str | None) -> str | None:
+    if text("best_for", best_for) not in (None, "series", "pictures", "size"):
+        raise ValueError(f"best_for: 'series', 'pictures' or 'size', not {best_for!r}")
+    return best_for
 
 
 def _bound(bound: str, floor: float) -> Any:

@@ -71,7 +71,7 @@ def convert(
         settings["range"] = _range(client, array, settings.get("missing"))
     frames = array.sizes[array.dims[0]]
     if settings.get("window") is None:
-        settings["window"] = WINDOWS.get(settings.get("best_for"), 32)  # shards are runs of windows
+        settings["window"] = WINDOWS.get(str(settings.get("best_for")), 32)  # shards are runs of windows
     chain = settings.setdefault("chain", 8) * settings["window"]
     workers = max(len(client.scheduler_info()["workers"]), 1)
     shards = shards or max(min(-(-frames // chain), 4 * workers), 1)

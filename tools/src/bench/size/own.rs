@@ -90,8 +90,8 @@ fn measure(task: &Task) -> Result<Measured> {
 }
 
 fn encode(task: &Task) -> Result<(ConvertReport, Vec<u8>)> {
-    let config = schemes::config(&task.scheme, task.tolerance, task.range, MEMORY)?;
     let mut frames = formats::open(std::slice::from_ref(&task.source), &OpenOptions::default())?;
+    let config = schemes::config(&task.scheme, frames.archive(), task.tolerance, task.range, MEMORY)?;
     let mut bytes = Vec::new();
     let report = convert(frames.as_mut(), &config, &task.output, &mut bytes, &Silent)?;
     Ok((report, bytes))
