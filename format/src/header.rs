@@ -65,8 +65,8 @@ impl Features {
     }
 
     /// These features and others.
-    pub(crate) fn with_those_of(self, windows: Self) -> Self {
-        Self::of_bits(self.bits() | windows.bits())
+    pub(crate) fn with_those_of(self, other: Self) -> Self {
+        Self::of_bits(self.bits() | other.bits())
     }
 
     /// All combinations of features.
@@ -74,6 +74,7 @@ impl Features {
         (0..1 << REQUIRED.len()).map(Self::of_bits)
     }
 
+    /// The features that these bits of `required` mean.
     fn of_bits(required: u64) -> Self {
         let packing = if required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
         let has = |bit: u64| required & bit != 0;

@@ -397,9 +397,9 @@ impl Block {
 
     /// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
     fn clip(&self, codec: &WindowCodec, frames: &[usize], samples: &mut [u8]) {
-        let Some(range) = codec.clip else { return };
+        let Some((lo, hi)) = codec.clip else { return };
         let each = self.voxels * codec.sample.size();
-        frames.iter().for_each(|frame| clip(codec.sample, range, &mut samples[frame * each..][..each]));
+        frames.iter().for_each(|frame| clip(codec.sample, lo, hi, &mut samples[frame * each..][..each]));
     }
 
     /// Replaces samples by outliers and missing samples.
@@ -413,7 +413,8 @@ impl Block {
     }
 }
 
-fn clip(ty: SampleType, (lo, hi): (f64, f64), samples: &mut [u8]) {
+/// Replaces samples below `lo` by it, and those above `hi` by that.
+fn clip(ty: SampleType, lo: f64, hi: f64, samples: &mut [u8]) {
     let mut values = vec![0.0; CLIPPED];
     for run in samples.chunks_mut(CLIPPED * ty.size()) {
         let values = &mut values[..run.len() / ty.size()];

@@ -23,13 +23,13 @@ pub(super) fn may_be_smaller(samples: &[u8], size: usize, voxels: usize, bytes: 
     count as f64 * alone.min(along_time) * CONTEXTS < 8.0 * bytes as f64
 }
 
-/// Bits for each of so many things of each kind.
+/// The entropy of things that occur so often, in bits for each.
 fn entropy<'a>(counts: impl Iterator<Item = &'a usize> + Clone) -> f64 {
     let total = counts.clone().sum::<usize>() as f64;
     counts.map(|count| *count as f64 / total).map(|share| -share * libm::log2(share)).sum()
 }
 
-/// The samples that are looked at: runs of so many.
+/// The number of runs of samples that are looked at, spread evenly, and the samples of a run.
 const RUNS: usize = 64;
 const RUN: usize = 64;
 

@@ -198,16 +198,13 @@ impl SchemeSelector<'_> {
     ) -> (f64, Scheme) {
         let mut best = first.clone();
         loop {
-            let next = self.with_step(&best.1, factor, trials);
+            let scheme = Scheme { coarseness: best.1.coarseness * factor, ..best.1.clone() };
+            let next = self.tried(scheme, trials);
             if next.0 >= best.0 {
                 return best;
             }
             best = next;
         }
-    }
-
-    fn with_step<R: Real + Send + Sync>(&self, scheme: &Scheme, factor: f64, trials: &Trials<'_, R>) -> (f64, Scheme) {
-        self.tried(Scheme { coarseness: scheme.coarseness * factor, ..scheme.clone() }, trials)
     }
 
     /// A scheme with its estimated bytes of the window.

@@ -54,7 +54,7 @@ impl Choice for BestFor {
 }
 
 impl BestFor {
-    /// Frames in a window, of which so many are usual.
+    /// Frames in a window; `usual` is the default number.
     pub(super) fn window(self, usual: usize) -> usize {
         match self {
             Self::Series => usual.max(128),
@@ -63,7 +63,7 @@ impl BestFor {
         }
     }
 
-    /// Voxels a side of a block for windows of so many frames; none for the usual number.
+    /// Voxels a side of a block in windows of `window` frames; none for the default number.
     pub(super) fn block(self, dims: [usize; 3], window: usize) -> Option<usize> {
         let fits =
             |edge: &usize| dims.iter().all(|n| n >= edge) && (edge * edge * edge * window) as u64 <= MAX_BLOCK_SAMPLES;
