@@ -70,7 +70,7 @@ fn keeps_its_error(
             Quantity::Mean => range * seen.largest_weight / weight,
             Quantity::Emission => magnitude * seen.largest_weight,
         };
-        let most = (report.views[0].stated_splat_error + 1e-5) * unit + rounding(*found) + rounding(*expected);
+        let most = (report.views[0].stated_splat_error + 1e-7) * unit + rounding(*found) + rounding(*expected);
         let off = f64::from(*found) - f64::from(*expected);
         assert!(found.is_nan() || off.abs() <= most, "{what}: {found} for {expected}");
     }
@@ -91,13 +91,13 @@ const DIRECTIONS: [(f64, f64); 8] = [
 
 #[test]
 fn frames_on_a_lattice_keep_the_error_that_they_state() {
-    assert!(frames_keep_their_error(3..6) >= 12);
+    assert!(frames_keep_their_error(3..6) >= 24);
 }
 
 #[test]
 #[ignore = "exhaustive"]
 fn frames_on_a_lattice_keep_the_error_that_they_state_in_every_direction() {
-    assert!(frames_keep_their_error(0..DIRECTIONS.len()) >= 36);
+    assert!(frames_keep_their_error(0..DIRECTIONS.len()) >= 60);
 }
 
 /// How many pictures from some of the directions were splatted on a lattice.
@@ -115,7 +115,7 @@ fn frames_keep_their_error(directions: Range<usize>) -> usize {
         let region = (n == 5).then_some(Region { start: [0, 2, 1], ..grid.whole() });
         let plain = RenderConfig { region, ..looking(view, tau, Quantity::Emission, &grid, 2) };
         let seen = truth(&grid, &plain, 3.0, &vec![0.0; grid.whole().voxels()], None);
-        for splat_error in [2e-2, 1e-3, 3e-5] {
+        for splat_error in [2e-2, 1e-3, 1e-4, 1e-5] {
             for quantity in [Quantity::Emission, Quantity::Mean] {
                 let exact = RenderConfig { quantity, ..plain.clone() };
                 let quick = RenderConfig { splat_error, ..exact.clone() };
@@ -158,7 +158,7 @@ fn no_signs_of_samples_exceed_the_stated_error() {
         let memory = archive(grid, SampleType::F64, &single);
         let view = View { scale: Some(5.0), roll, ..view(azimuth, elevation, [50, 50]) };
         let exact = looking(view, 0.0, Quantity::Emission, &grid, voxels);
-        for splat_error in [1e-3, 5e-3] {
+        for splat_error in [5e-3, 1e-3, 1e-4, 1e-5] {
             let config = RenderConfig { splat_error, ..exact.clone() };
             let (found, report) = pictures(&mut direct(&memory, None), &config);
             let (expected, _) = pictures(&mut direct(&memory, None), &exact);
@@ -178,7 +178,7 @@ fn no_signs_of_samples_exceed_the_stated_error() {
             assert!(reached > 0.02 * stated, "{azimuth}: {reached:e} is far from {stated:e}");
         }
     }
-    assert!(attacked >= 9, "{attacked} were splatted on a lattice");
+    assert!(attacked >= 18, "{attacked} were splatted on a lattice");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Large buffers of zeros. They lie in huge pages where the system offers them: fresh memory in small pages costs as
 //! much as the work done in it.
 
-use bytemuck::Pod;
+pub use bytemuck::Pod;
 use memmap2::MmapMut;
 use std::fmt;
 use std::ops::{Deref, DerefMut};

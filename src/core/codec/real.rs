@@ -1,10 +1,13 @@
 //! The two floating-point types in which a pyramid can be computed.
 
 use super::buffer::Pooled;
+use crate::base::zeroed::Pod;
 use std::ops::{Add, Mul, Sub};
 
 /// `f32` or `f64`. All operations are correctly rounded, so every machine computes the same bits.
-pub trait Real: Pooled + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub trait Real:
+    Pooled + Pod + Send + Sync + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
     /// Codes are smaller than this. Whole numbers up to it, and halves between them, are exact.
     const MOST_CODE: Self;
 

@@ -127,26 +127,9 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
-    /// The sum of weights at a point of `count` voxels in a row. The first voxel is `off` pixels from the point at
-    /// depth `z`; each next voxel is a `step` in pixels and a step in depth further. The voxels should not lie much
-    /// further than the reach.
-    pub fn sum_of_row(&self, off: [f64; 2], z: f64, step: [f64; 2], deeper: f64, count: usize) -> f64 {
-        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
-        let exponent = |off: [f64; 2], z: f64| self.tau * z + self.decay * dot(off, off);
-        if self.decay > NARROW || exponent(off, z) > DEEP {
-            let at = |n: f64| libm::exp(-exponent([off[0] + n * step[0], off[1] + n * step[1]], z + n * deeper));
-            return self.peak * (0..count).map(|n| at(n as f64)).sum::<f64>();
-        }
-        let mut weight = self.peak * libm::exp(-exponent(off, z));
-        let mut quotient = libm::exp(-self.tau * deeper - self.decay * (2.0 * dot(off, step) + dot(step, step)));
-        let bend = libm::exp(-2.0 * self.decay * dot(step, step));
-        let mut sum = 0.0;
-        for _ in 0..count {
-            sum += weight;
-            weight *= quotient;
-            quotient *= bend;
-        }
-        sum
+    /// Rows of voxels, each of which is a `step` in pixels and a step in depth further than the last.
+    pub fn rows(self, step: [f64; 2], deeper: f64) -> VoxelRows {
+        VoxelRows { footprint: self, step, deeper, bend: libm::exp(-2.0 * self.decay * dot(step, step)) }
     }
 
     /// The weight [x, y] pixels from a voxel, as a share of the weight at its centre: exp(-(x^2 + y^2) / (2 sigma^2)).
@@ -191,6 +174,42 @@ impl Footprint {
             }
         }
     }
+}
+
+/// Rows of voxels that are seen at the same angle.
+#[derive(Debug, Clone, Copy)]
+pub struct VoxelRows {
+    footprint: Footprint,
+    step: [f64; 2],
+    deeper: f64,
+    /// The second quotient of the weights of neighbouring voxels.
+    bend: f64,
+}
+
+impl VoxelRows {
+    /// The sum of weights at a point of `count` voxels in a row. The first voxel is `off` pixels from the point at depth
+    /// `z`. The voxels should not lie much further than the reach.
+    pub fn sum(&self, off: [f64; 2], z: f64, count: usize) -> f64 {
+        let Self { footprint: Footprint { peak, tau, decay, .. }, step, deeper, bend } = *self;
+        let exponent = |off: [f64; 2], z: f64| tau * z + decay * dot(off, off);
+        if decay > NARROW || exponent(off, z) > DEEP {
+            let at = |n: f64| libm::exp(-exponent([off[0] + n * step[0], off[1] + n * step[1]], z + n * deeper));
+            return peak * (0..count).map(|n| at(n as f64)).sum::<f64>();
+        }
+        let mut weight = peak * libm::exp(-exponent(off, z));
+        let mut quotient = libm::exp(-tau * deeper - decay * (2.0 * dot(off, step) + dot(step, step)));
+        let mut sum = 0.0;
+        for _ in 0..count {
+            sum += weight;
+            weight *= quotient;
+            quotient *= bend;
+        }
+        sum
+    }
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
 }
 
 /// Upper limit of the peak: sums of 1e20 products with the largest `f32` do not overflow.
@@ -248,7 +267,7 @@ mod tests {
                 for (z, deeper) in [(3.0, 0.5), (3.0, -0.5), (7e3, -0.5), (7.45e3, -50.0)] {
                     let depth = |n: usize| z + deeper * n as f64;
                     let expected: f64 = (0..count).map(|n| f.at_depth(depth(n)) * f.share(at(n))).sum();
-                    let found = f.sum_of_row(off, z, step, deeper, count);
+                    let found = f.rows(step, deeper).sum(off, z, count);
                     let off = (found - expected).abs();
                     assert!(off <= 1e-9 * expected + 1e-320, "{scale} {step:?} {z}: {found} for {expected}");
                 }

@@ -124,11 +124,7 @@ fn render_batch(
     let (layout, pixels) = (batch.layout(), group.budget.pixels());
     let reconstructors: Vec<_> =
         group.weights.iter().map(|weights| PixelReconstructor::new(batch, weights, config)).collect();
-    let empty = |view: &PixelReconstructor<'_>| {
-        let mut pictures = Zeroed::new(view.pictures() * pixels);
-        pictures.fill(f32::NAN);
-        pictures
-    };
+    let empty = |view: &PixelReconstructor<'_>| Zeroed::new(view.pictures() * pixels);
     let mut pictures: Vec<Zeroed<f32>> = reconstructors.iter().map(empty).collect();
     let finish =
         |view: usize, tile: ResolvedTile<'_>, rows: &mut Pixels<'_, f32>| reconstructors[view].tile(tile, rows);

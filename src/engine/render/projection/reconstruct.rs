@@ -29,7 +29,7 @@ impl<'a> PixelReconstructor<'a> {
         self.layout.frames * (1 + usize::from(self.certificate.is_some()))
     }
 
-    /// Turns the planes of a tile into its pixels. Leaves background pixels unchanged.
+    /// Turns the planes of a tile into its pixels. Background pixels are NaN.
     pub(super) fn tile(&self, mut tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f32>) {
         let mut inverse = self.batch.inverse(&tile.used());
         let mut planes = vec![Lane::default(); self.layout.planes()];
@@ -41,6 +41,7 @@ impl<'a> PixelReconstructor<'a> {
                 let x = tile.rect.x.start + first;
                 let weights = Lanes::new(self.weights, [x, y], count);
                 if self.quantity == Quantity::Mean && weights.are_background() {
+                    (0..self.pictures()).for_each(|picture| pixels.at(picture, [x, y], count).fill(f32::NAN));
                     continue;
                 }
                 tile.load(at + first, count, &mut planes);

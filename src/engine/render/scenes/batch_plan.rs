@@ -6,6 +6,7 @@ use crate::render::config::RenderConfig;
 use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::codec::WindowCodec;
+use wavesplat_core::codec::decode::WantedFrames;
 use wavesplat_core::wavelet::needed;
 use wavesplat_format::Window;
 
@@ -29,10 +30,8 @@ impl Choice for SplatSource {
 pub(super) struct BatchPlan {
     pub(super) what: SplatSource,
     pub(super) codec: WindowCodec,
-    /// Frame numbers, counted from the first frame of the window.
-    pub(super) frames: Vec<usize>,
-    /// For each coefficient, whether the frames need it.
-    pub(super) wanted: Vec<bool>,
+    /// The frames, counted from the first frame of the window, and the coefficients that they need.
+    pub(super) wanted: WantedFrames,
     /// The coefficients that the frames need, ascending.
     pub(super) kept: Vec<usize>,
     /// Whether planes hold the values of each frame instead of coefficients.
@@ -54,13 +53,13 @@ impl BatchPlan {
         let first = file.window_range(window).start;
         let frames: Vec<usize> = request.frames.iter().map(|f| f - first).collect();
         let codec = file.codec(window)?;
-        let wanted = needed(&codec.synthesis, &frames);
-        let kept: Vec<usize> = (0..wanted.len()).filter(|k| wanted[*k]).collect();
+        let wanted = WantedFrames::new(&codec, frames);
+        let kept: Vec<usize> = (0..wanted.coefficients.len()).filter(|k| wanted.coefficients[*k]).collect();
         let few = few_asked(file, &codec, window, config);
         let by_values = what != SplatSource::Samples && !config.certify && (few || !config.mode.is_projection());
         let values = what == SplatSource::Samples || by_values;
         let layout = layout(file, &codec, window, request, values, kept.len());
-        Ok(Self { what, codec, frames, wanted, kept, by_values, few, layout })
+        Ok(Self { what, codec, wanted, kept, by_values, few, layout })
     }
 }
 

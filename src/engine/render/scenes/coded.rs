@@ -7,7 +7,7 @@ use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
-use wavesplat_core::codec::decode::{Block, WantedFrames};
+use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::Field;
 
 /// A decoded block of a file.
@@ -36,8 +36,7 @@ impl<'a> CodedBlock<'a> {
     pub(super) fn new(plan: &'a BatchPlan, decoded: Arc<DecodedBlock>, errors: Vec<f64>) -> Self {
         let DecodedBlock { block, field } = decoded.as_ref();
         if block.exact.is_some() || plan.what == SplatSource::Samples {
-            let wanted = WantedFrames::new(&plan.codec, plan.frames.clone());
-            let dense = Dense::Samples(block.samples_of(&plan.codec, &wanted));
+            let dense = Dense::Samples(block.samples_of(&plan.codec, &plan.wanted));
             return Self { plan, decoded, errors, dense, few: Vec::new() };
         }
         let mut few = overrides(plan, block, field.as_ref());
@@ -57,8 +56,8 @@ impl<'a> CodedBlock<'a> {
         let Some((frame, absent)) = plan.layout.samples(plane) else { return PlaneValues::Nothing };
         let bytes = samples.len() / plan.codec.frames();
         scratch.bytes.clear();
-        scratch.bytes.extend_from_slice(&samples[plan.frames[frame] * bytes..][..bytes]);
-        let first = plan.frames[frame] * block.voxels;
+        scratch.bytes.extend_from_slice(&samples[plan.wanted.frames[frame] * bytes..][..bytes]);
+        let first = plan.wanted.frames[frame] * block.voxels;
         // An exact block may have no mask.
         let is_missing = |voxel: usize, v: f64| block.is_missing(first + voxel) || plan.codec.is_missing(v);
         match plan.layout.absent {
@@ -131,7 +130,7 @@ fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut 
     if block.is_zero() && few.is_empty() {
         return Vec::new();
     }
-    let mut values = vec![0.0; plan.frames.len() * block.voxels];
+    let mut values = vec![0.0; plan.wanted.frames.len() * block.voxels];
     if plan.few {
         add_coefficients(plan, block, field, &mut values);
     } else if !block.is_zero() {
@@ -148,7 +147,7 @@ fn add_coefficients(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, 
     let scratch = &mut Scratch::default();
     for k in &plan.kept {
         let coefficients = coefficients(plan, block, field, *k, scratch);
-        for (frame, values) in plan.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
+        for (frame, values) in plan.wanted.frames.iter().zip(values.chunks_exact_mut(block.voxels)) {
             coefficients.add_to(plan.codec.synthesis[*k][*frame], values);
         }
     }
@@ -157,9 +156,8 @@ fn add_coefficients(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, 
 /// Stores the values of a plan's frames by the inverse transform.
 fn put_runs(plan: &BatchPlan, block: &Block, values: &mut [f64]) {
     let mut places = vec![None; plan.codec.frames()];
-    plan.frames.iter().enumerate().for_each(|(i, frame)| places[*frame] = Some(i));
-    let wanted = WantedFrames::new(&plan.codec, plan.frames.clone());
-    block.for_each_run(&plan.codec, &wanted, |first, run| {
+    plan.wanted.frames.iter().enumerate().for_each(|(i, frame)| places[*frame] = Some(i));
+    block.for_each_run(&plan.codec, &plan.wanted, |first, run| {
         if let Some(place) = places[first / block.voxels] {
             values[place * block.voxels + first % block.voxels..][..run.len()].copy_from_slice(run);
         }
@@ -174,7 +172,7 @@ fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<
     }
     let mut few = vec![Vec::new(); layout.planes()];
     let whole = field.is_none().then(|| block.field(codec));
-    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &plan.frames));
+    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &plan.wanted.frames));
     for (voxel, frame, value) in samples.into_iter().flatten() {
         few[layout.value(frame)].push((voxel as u32, value));
     }
@@ -183,7 +181,7 @@ fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<
         if misses_all(plan, block, voxel) {
             add(layout.absent_in_all());
         } else {
-            let missing = |f: &usize| block.is_missing(plan.frames[*f] * block.voxels + voxel);
+            let missing = |f: &usize| block.is_missing(plan.wanted.frames[*f] * block.voxels + voxel);
             (0..layout.frames).filter(missing).for_each(|f| add(layout.absent(f)));
         }
     }

@@ -241,11 +241,12 @@ impl<'a> CoefficientBatch<'a> {
             // An outlier adds its sample minus the value from the coefficients.
             absolute_sum: 2.0 * absolute_sum + magnitude(range),
         };
-        let of_part = |gains: &Vec<f64>| self.plan.frames.iter().map(|f| gains[*f]).collect();
-        let factors = std::iter::once(vec![1.0; self.plan.frames.len()]).chain(self.selector.gains.iter().map(of_part));
+        let of_part = |gains: &Vec<f64>| self.plan.wanted.frames.iter().map(|f| gains[*f]).collect();
+        let factors =
+            std::iter::once(vec![1.0; self.plan.wanted.frames.len()]).chain(self.selector.gains.iter().map(of_part));
         SampleErrors {
             factors: factors.take(self.plan.layout.error_planes).collect(),
-            frames: vec![frame; self.plan.frames.len()],
+            frames: vec![frame; self.plan.wanted.frames.len()],
         }
     }
 
@@ -264,7 +265,7 @@ impl<'a> CoefficientBatch<'a> {
     /// The parts that the batch's frames do not need.
     fn of_other_frames(&self, entry: &BlockEntry) -> LeftOut {
         let needs = |part: &PartEntry| match part.kind {
-            PartKind::Level(level) => self.plan.codec.needs_part(level.into(), &self.plan.wanted),
+            PartKind::Level(level) => self.plan.codec.needs_part(level.into(), &self.plan.wanted.coefficients),
             _ => true,
         };
         let parts = entry.parts.iter().filter(|part| needs(part)).copied().collect();
@@ -302,7 +303,7 @@ impl<'a> CoefficientBatch<'a> {
             if prefetch.is_full() {
                 break;
             }
-            prefetch.add(codec, &self.kept(*block)?.entry, wanted)?;
+            prefetch.add(codec, &self.kept(*block)?.entry, &wanted.coefficients)?;
         }
         Ok(())
     }
@@ -312,7 +313,7 @@ impl<'a> CoefficientBatch<'a> {
         let KeptParts { entry, errors, .. } = self.kept(block)?;
         let BatchPlan { codec, wanted, what, .. } = &self.plan;
         let splats_coefficients = *what == SplatSource::Coefficients;
-        Ok((self.file.decoded(codec, &entry, wanted, splats_coefficients)?, errors))
+        Ok((self.file.decoded(codec, &entry, &wanted.coefficients, splats_coefficients)?, errors))
     }
 }
 
@@ -335,8 +336,8 @@ impl FrameBatch for CoefficientBatch<'_> {
             return Ok(()); // some of them are asked for next
         }
         let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;
-        let decoded_now = next.iter().filter(|entry| !self.file.keeps_coefficients(codec, entry, wanted));
-        self.file.decode_shared(codec, decoded_now, wanted)
+        let decoded_now = next.iter().filter(|entry| !self.file.keeps_coefficients(codec, entry, &wanted.coefficients));
+        self.file.decode_shared(codec, decoded_now, &wanted.coefficients)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
@@ -366,7 +367,7 @@ impl FrameBatch for CoefficientBatch<'_> {
                 only.as_deref().unwrap_or(self.plan.codec.basis.as_ref()).inverse(&mut coefficients, &mut series);
             }
             for (f, out) in frames.iter_mut().enumerate() {
-                *out = series[self.plan.frames[f]];
+                *out = series[self.plan.wanted.frames[f]];
                 if self.plan.layout.values {
                     let value = planes[self.plan.layout.value(f)];
                     out.iter_mut().zip(value).for_each(|(o, v)| *o += v);

@@ -23,6 +23,7 @@ use super::{Picture, Pixel, Rendered};
 use movie::Movie;
 use page::Page;
 use png::Animation;
+use rayon::prelude::*;
 use sheet::Sheet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -229,7 +230,8 @@ impl SinkConfig {
 
     /// A coloured picture without annotations.
     fn plain(&self, picture: Picture<'_>) -> Vec<Rgb> {
-        picture.chunks_exact(self.pixel.numbers()).map(|pixel| self.colours.colour_of_pixel(pixel)).collect()
+        let pixels = picture.par_chunks_exact(self.pixel.numbers()).with_min_len(PIXELS);
+        pixels.map(|pixel| self.colours.colour_of_pixel(pixel)).collect()
     }
 
     /// The same as [`Self::image`], with 16 bits per channel; annotations have 8.
@@ -245,6 +247,9 @@ impl SinkConfig {
         image
     }
 }
+
+/// The least number of pixels that a thread colours.
+const PIXELS: usize = 1 << 14;
 
 /// The output of pictures.
 pub struct Sink {

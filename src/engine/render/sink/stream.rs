@@ -35,12 +35,10 @@ pub(super) fn write(
     out: &mut impl Write,
 ) -> io::Result<()> {
     match config.format {
-        PictureFormat::Npy if !config.coloured_array => {
-            out.write_all(&picture.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
-        }
+        PictureFormat::Npy if !config.coloured_array => write_numbers(picture, f32::to_le_bytes, out),
         PictureFormat::Gray16 => {
-            let level = |v: &f32| ((config.colours.share(*v) * 65535.0).round() as u16).to_le_bytes();
-            out.write_all(&picture.iter().flat_map(level).collect::<Vec<u8>>())
+            let level = |v: f32| ((config.colours.share(v) * 65535.0).round() as u16).to_le_bytes();
+            write_numbers(picture, level, out)
         }
         PictureFormat::Y4m => write_yuv(config.image(rendered, picture), out),
         PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) | PictureFormat::Page => {
@@ -52,6 +50,23 @@ pub(super) fn write(
         }
     }
 }
+
+/// Writes the `bytes` of numbers, some at a time: a buffer for all would be fresh memory for every picture.
+fn write_numbers<const N: usize>(
+    numbers: &[f32],
+    bytes: impl Fn(f32) -> [u8; N],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let mut buffer = Vec::with_capacity(SOME * N);
+    numbers.chunks(SOME).try_for_each(|some| {
+        buffer.clear();
+        buffer.extend(some.iter().flat_map(|number| bytes(*number)));
+        out.write_all(&buffer)
+    })
+}
+
+/// Numbers that are written together.
+const SOME: usize = 1 << 14;
 
 fn write_yuv(mut pixels: Vec<Rgb>, out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "FRAME")?;

@@ -107,7 +107,10 @@ impl SplatBackend {
     /// An upper bound of the bytes for the sums of the whole picture that a lattice keeps: the cells of ones, and as many
     /// while they are filtered.
     pub(in crate::render) fn ones_bytes(&self, width: usize, height: usize) -> usize {
-        2 * self.double_bytes(width, height)
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => 2 * lattice.plane_bytes(width, height),
+        }
     }
 
     /// The f64 numbers that may be kept with a block while it is splatted.

@@ -16,7 +16,7 @@ pub(super) struct LatticeBands<'a, 'c> {
     rectangles: Vec<Rectangle>,
     room: &'c DoubleRoom,
     /// Buffers for reuse: fresh memory from the system costs as much as the work done in it.
-    spare: Mutex<Vec<(Scratch, SpreadScratch<f32>)>>,
+    spare: Mutex<Vec<(Scratch, SpreadScratch)>>,
 }
 
 /// A block and its location in every band that it reaches.

@@ -8,7 +8,7 @@ use std::ops::Range;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::view::camera::Camera;
-use wavesplat_core::view::footprint::{Footprint, Kernel, Method};
+use wavesplat_core::view::footprint::{Footprint, Kernel, Method, VoxelRows};
 
 /// Sums of uncut weights of a view at single pixels.
 pub(in crate::render) struct ReferenceWeights<'a> {
@@ -19,6 +19,10 @@ pub(in crate::render) struct ReferenceWeights<'a> {
     tau: f64,
     /// It stands for an uncut one.
     footprint: Footprint,
+    /// Pixels from its centre to its cut.
+    reach: f64,
+    /// The rows of voxels along b.
+    rows: VoxelRows,
     shear: Shear,
 }
 
@@ -29,7 +33,10 @@ impl<'a> ReferenceWeights<'a> {
     /// A kernel whose weights are no numbers.
     pub(in crate::render) fn new(camera: &'a Camera, grid: &'a Grid, clip: Region, kernel: Kernel) -> Result<Self> {
         let footprint = Footprint::new(kernel, grid, camera.scale, Method::EXACT)?;
-        Ok(Self { camera, grid, clip, tau: kernel.tau, footprint, shear: Shear::new(camera, grid, 1) })
+        let reach = Method::EXACT.radius * kernel.sigma * camera.scale;
+        let shear = Shear::new(camera, grid, 1);
+        let rows = footprint.rows(shear.pixels[0], shear.depths[0]);
+        Ok(Self { camera, grid, clip, tau: kernel.tau, footprint, reach, rows, shear })
     }
 
     /// The sum at a pixel's centre.
@@ -129,21 +136,21 @@ impl<'a> ReferenceWeights<'a> {
 
     /// Voxels that a footprint reaches to one side along b (0) or c (1).
     fn half(&self, i: usize) -> f64 {
-        let reach = self.footprint.reach;
+        let reach = self.reach;
         let corners = [[reach, reach], [reach, -reach]].map(|off| self.shear.cells(off)[i].abs());
         corners[0].max(corners[1])
     }
 
     /// The sum over the voxels `all` of a row along b that starts at `voxel`.
     fn row(&self, mut voxel: [usize; 3], all: Range<usize>, point: [f64; 2]) -> f64 {
-        let ([bx, by], reach) = (self.shear.pixels[0], self.footprint.reach);
+        let ([bx, by], reach) = (self.shear.pixels[0], self.reach);
         let squared = bx * bx + by * by;
         let off = self.off(voxel, point);
         let centre = -(off[0] * bx + off[1] * by) / squared;
         let near = around(centre, std::f64::consts::SQRT_2 * reach / squared.sqrt(), all);
         voxel[self.shear.axes[0]] = near.start;
         let (off, z) = (self.off(voxel, point), self.shear.depth(voxel));
-        self.footprint.sum_of_row(off, z, [bx, by], self.shear.depths[0], near.len())
+        self.rows.sum(off, z, near.len())
     }
 
     /// The offset from a point of the picture to a voxel, in pixels.

@@ -5,30 +5,39 @@
 pub(super) struct Phases {
     /// Values, padded with zeros to whole vectors.
     pub(super) padded: usize,
-    /// The values at positions 0, 1 / [`PHASES`], ... 1 after a cell.
+    /// Positions between two cells in the table. Between these, values are interpolated.
+    pub(super) phases: usize,
+    /// The values at positions 0, 1 / `phases`, ... 1 after a cell.
     table: Vec<f32>,
 }
 
-/// Positions between two cells in a table. Between these, values are interpolated.
-pub(super) const PHASES: usize = 256;
+/// How far a kernel reaches, and how finely it is tabulated.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cut {
+    /// It is cut at this number of standard deviations or beyond.
+    pub(super) radius: f64,
+    /// Positions between two cells in its tables.
+    pub(super) phases: usize,
+}
+
 /// Values that are computed together.
 pub(super) const VECTOR: usize = 8;
 
 impl Phases {
-    /// Tabulates `value(t, n)` at the cells n = 1 - `half`, ... `half`, for a position t after cell 0.
-    pub(super) fn new(half: usize, value: impl Fn(f64, isize) -> f64) -> Self {
+    /// Tabulates `value(t, n)` at the cells n = 1 - `half`, ... `half`, for `phases` positions t after cell 0.
+    pub(super) fn new(half: usize, phases: usize, value: impl Fn(f64, isize) -> f64) -> Self {
         let (cells, value) = (2 * half, &value);
         let padded = cells.next_multiple_of(VECTOR);
         let at = |t: f64, n: usize| if n < cells { value(t, n as isize + 1 - half as isize) as f32 } else { 0.0 };
-        let phase = |phase: usize| (0..padded).map(move |n| at(phase as f64 / PHASES as f64, n));
-        Self { padded, table: (0..=PHASES).flat_map(phase).collect() }
+        let phase = |phase: usize| (0..padded).map(move |n| at(phase as f64 / phases as f64, n));
+        Self { padded, phases, table: (0..=phases).flat_map(phase).collect() }
     }
 
     /// The values at a position from 0 to 1 after a cell.
     #[inline(always)]
     pub(super) fn fill(&self, position: f64, out: &mut [f32]) {
-        let at = position * PHASES as f64;
-        let phase = (at as usize).min(PHASES - 1);
+        let at = position * self.phases as f64;
+        let phase = (at as usize).min(self.phases - 1);
         let share = (at - phase as f64) as f32;
         let (low, high) = self.table[phase * self.padded..][..2 * self.padded].split_at(self.padded);
         let vectors = out.as_chunks_mut::<VECTOR>().0.iter_mut();
@@ -71,22 +80,22 @@ pub(super) struct AxisKernel {
 }
 
 /// The largest share of the sum of a Gaussian that interpolation between phases gets wrong, for `sigma` cells.
-pub(super) fn interpolated(sigma: f64) -> f64 {
-    1.0 / (8.0 * (PHASES as f64 * sigma).powi(2))
+pub(super) fn interpolated(sigma: f64, phases: usize) -> f64 {
+    1.0 / (8.0 * (phases as f64 * sigma).powi(2))
 }
 
 impl AxisKernel {
-    /// The kernel with a standard deviation of `sigma` cells, cut at `radius` deviations or beyond; `None` if it has
-    /// too many cells.
-    pub(super) fn new(sigma: f64, radius: f64) -> Option<Self> {
+    /// The kernel with a standard deviation of `sigma` cells; `None` if it has too many cells.
+    pub(super) fn new(sigma: f64, Cut { radius, phases }: Cut) -> Option<Self> {
         let half = half(sigma, radius)?;
         let gaussian = |distance: f64| libm::exp(-0.5 * (distance / sigma) * (distance / sigma));
         // At a position between two cells, the cells left out begin `half` or more away on either side.
         let beyond = |n: usize| gaussian((half + n) as f64) + gaussian((half + 1 + n) as f64);
         let left_out: f64 = (0..2 * half + 8).map(beyond).sum();
         let all: f64 = (0..2 * half).map(|n| gaussian(half as f64 - 0.5 - n as f64)).sum();
-        let phases = Phases::new(half, |t, n| gaussian(t - n as f64));
-        Some(Self { cells: 2 * half, phases, cut: left_out / all + interpolated(sigma) })
+        let cut = left_out / all + interpolated(sigma, phases);
+        let phases = Phases::new(half, phases, |t, n| gaussian(t - n as f64));
+        Some(Self { cells: 2 * half, phases, cut })
     }
 
     /// The cells with a weight, padded to whole vectors.
@@ -109,8 +118,8 @@ mod tests {
 
     #[test]
     fn weights_are_the_gaussian() {
-        for (sigma, radius) in [(1.5, 4.5), (0.7, 3.0), (6.0, 5.0)] {
-            let kernel = AxisKernel::new(sigma, radius).expect("a kernel");
+        for (sigma, radius, phases) in [(1.5, 4.5, 256), (0.7, 3.0, 256), (6.0, 5.0, 1024)] {
+            let kernel = AxisKernel::new(sigma, Cut { radius, phases }).expect("a kernel");
             let mut weights = vec![0.0; kernel.padded()];
             for position in [0.0, -3.25, 7.999, 0.503, -0.001] {
                 let first = kernel.weights(position, &mut weights);
@@ -123,6 +132,7 @@ mod tests {
                 assert!((all - held + off) / all <= kernel.cut + 1e-6, "{sigma} {position}");
             }
         }
-        assert!(AxisKernel::new(30.0, 5.0).is_none() && AxisKernel::new(f64::NAN, 5.0).is_none());
+        let cut = Cut { radius: 5.0, phases: 256 };
+        assert!(AxisKernel::new(30.0, cut).is_none() && AxisKernel::new(f64::NAN, cut).is_none());
     }
 }

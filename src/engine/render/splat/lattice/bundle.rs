@@ -44,7 +44,8 @@ impl<'a> Bundles<'a> {
         let offset: Vec<OffsetPlane> = offset.collect();
         let is_offset = |number: usize| offset.iter().any(|plane| plane.number == number);
         let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, is_offset)).collect();
-        let mut bundles = Self { single, double: Vec::new() };
+        let double = cells.double_groups.iter().filter_map(|group| of_group(cells, group, tile, |_| false)).collect();
+        let mut bundles = Self { single, double };
         let count = places(offset.len()).max(1);
         match ones.map(|ones| (ones_in(ones, tile), offset.chunks(count))) {
             Some((ones, chunks)) => bundles.single.extend(chunks.map(|some| without_means(some, tile, &ones))),
@@ -62,12 +63,12 @@ impl<'a> Bundles<'a> {
 }
 
 /// The planes of a group with sums in the tile; `None` if there are none.
-fn of_group<'a>(
+fn of_group<'a, R: Real>(
     cells: &'a FilteredCells,
-    group: &'a Group,
+    group: &'a Group<R>,
     tile: &Window,
     is_offset: impl Fn(usize) -> bool,
-) -> Option<Bundle<'a, f32>> {
+) -> Option<Bundle<'a, R>> {
     let [(columns, _), (rows, _)] = cells.window.part_in(tile);
     let numbered = group.planes.iter().copied().enumerate();
     let touched = numbered.filter(|(place, n)| !is_offset(*n) && group.has_sums(*place, &columns, &rows));
@@ -165,28 +166,53 @@ fn side_by_side<R: Real>(
     Bundle { planes, places, stride: tile.size[0], window: *tile, cells: Cow::Owned(cells) }
 }
 
-/// The sum of cells times their weights, `N` planes side by side; the cells are `stride` apart. Even and odd cells have
-/// sums of their own, so that additions need not wait for each other.
+/// Sums that are kept apart, so that additions need not wait for each other.
+const APART: usize = 4;
+
+/// The sum of cells times their weights, `N` planes side by side; the cells are `stride` apart. The order of additions is the
+/// same for any `N`, so that pixels do not depend on how many planes are together.
 #[inline(always)]
 pub(super) fn weighted<R: Real, const N: usize>(cells: &[[R; N]], stride: usize, weights: &[f32]) -> [R; N] {
-    let (mut even, mut odd) = ([R::default(); N], [R::default(); N]);
-    let (pairs, rest) = weights.as_chunks::<2>();
-    for (n, pair) in pairs.iter().enumerate() {
-        let (a, b) = (R::from_f64(f64::from(pair[0])), R::from_f64(f64::from(pair[1])));
-        let (first, second) = (&cells[2 * n * stride], &cells[(2 * n + 1) * stride]);
-        for i in 0..N {
-            even[i] = even[i] + a * first[i];
-            odd[i] = odd[i] + b * second[i];
+    if N == 1 && stride == 1 {
+        return [weighted_alone(cells.as_flattened(), weights); N];
+    }
+    let mut sums = [[R::default(); N]; APART];
+    let (several, rest) = weights.as_chunks::<APART>();
+    for (n, weights) in several.iter().enumerate() {
+        for l in 0..APART {
+            add_weighted(&mut sums[l], weights[l], &cells[(APART * n + l) * stride]);
         }
     }
-    if let [last] = rest {
-        let (weight, cell) = (R::from_f64(f64::from(*last)), &cells[2 * pairs.len() * stride]);
-        for i in 0..N {
-            even[i] = even[i] + weight * cell[i];
-        }
+    for (l, weight) in rest.iter().enumerate() {
+        add_weighted(&mut sums[l], *weight, &cells[(APART * several.len() + l) * stride]);
     }
+    let [mut all, b, c, d] = sums;
     for i in 0..N {
-        even[i] = even[i] + odd[i];
+        all[i] = (all[i] + b[i]) + (c[i] + d[i]);
     }
-    even
+    all
+}
+
+#[inline(always)]
+fn add_weighted<R: Real, const N: usize>(sums: &mut [R; N], weight: f32, cell: &[R; N]) {
+    let weight = R::from_f64(f64::from(weight));
+    for i in 0..N {
+        sums[i] = sums[i] + weight * cell[i];
+    }
+}
+
+/// [`weighted`] for one plane whose cells are side by side: several cells at a time.
+#[inline(always)]
+fn weighted_alone<R: Real>(cells: &[R], weights: &[f32]) -> R {
+    let mut sums = [R::default(); APART];
+    let (several, rest) = weights.as_chunks::<APART>();
+    for (cells, weights) in cells.as_chunks::<APART>().0.iter().zip(several) {
+        for l in 0..APART {
+            sums[l] = sums[l] + R::from_f64(f64::from(weights[l])) * cells[l];
+        }
+    }
+    for (l, (weight, cell)) in rest.iter().zip(&cells[APART * several.len()..]).enumerate() {
+        sums[l] = sums[l] + R::from_f64(f64::from(*weight)) * *cell;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }

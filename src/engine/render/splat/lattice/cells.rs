@@ -1,5 +1,6 @@
 //! The cells (eq 35) of a band of a picture, with planes of sums.
 
+use super::Sums;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use wavesplat_core::base::vectors::dispatch;
@@ -16,11 +17,12 @@ pub(super) const TOGETHER: usize = 16;
 #[derive(Debug)]
 pub(in crate::render) struct Cells {
     pub(super) rectangle: Rectangle,
-    /// The sums of ordinary values, plane by plane, [`TOGETHER`] planes at most in each buffer.
+    /// The sums of ordinary values in f32, plane by plane, [`TOGETHER`] planes at most in each buffer.
     pub(super) single: Vec<Zeroed<f32>>,
     /// For each plane, the sums of values that sums in f32 cannot hold, and of the middles of blocks. A plane is the sum
     /// of both.
     pub(super) planes: Vec<PlaneSums>,
+    pub(super) sums: Sums,
 }
 
 /// The sums of one plane of cells that few planes have.
@@ -141,11 +143,11 @@ impl Rectangle {
     }
 
     /// The voxels of a row that reach the rectangle along an axis. The row has `count` voxels, q cells apart; the first
-    /// reaches `cell` and the `degree` cells after it.
-    pub(super) fn voxels_reaching(&self, axis: usize, cell: isize, degree: usize, count: usize) -> Range<usize> {
+    /// reaches `width` cells from `cell` on.
+    pub(super) fn voxels_reaching(&self, axis: usize, cell: isize, width: usize, count: usize) -> Range<usize> {
         let (before, phases) = (self.first[axis] - cell, self.phases as isize);
         let within = |n: isize| n.clamp(0, count as isize) as usize;
-        let start = within((before - degree as isize + phases - 1).div_euclid(phases));
+        let start = within((before - width as isize + phases).div_euclid(phases));
         let end = within((before + self.size[axis] as isize + phases - 1).div_euclid(phases));
         start..end.max(start)
     }
@@ -182,17 +184,20 @@ impl Cells {
     }
 
     /// Cells with all planes at zero.
-    pub(super) fn new(rectangle: Rectangle, planes: usize) -> Self {
+    pub(super) fn new(rectangle: Rectangle, planes: usize, sums: Sums) -> Self {
         let buffer = |first: usize| Zeroed::new(TOGETHER.min(planes - first) * rectangle.area());
-        let single = (0..planes).step_by(TOGETHER).map(buffer).collect();
-        Self { rectangle, single, planes: (0..planes).map(|_| PlaneSums::default()).collect() }
+        let of_single = if sums == Sums::Single { planes } else { 0 };
+        let single = (0..of_single).step_by(TOGETHER).map(buffer).collect();
+        let double = || (sums == Sums::Double).then(|| Aligned::zeros(rectangle.area()));
+        let plane = |_| PlaneSums { has_single: false, double: double() };
+        Self { rectangle, single, planes: (0..planes).map(plane).collect(), sums }
     }
 
     /// All planes, for adding values. Planes with sums in f64 take `room`.
     pub(in crate::render) fn planes_mut<'a>(&'a mut self, room: &'a DoubleRoom) -> Vec<CellPlane<'a>> {
         let rectangle = self.rectangle;
         let single = self.single.iter_mut().flat_map(|planes| planes.chunks_exact_mut(rectangle.area().max(1)));
-        // A rectangle without cells has no chunks.
+        // Sums in f64 and rectangles without cells have no chunks.
         let single = single.map(Some).chain(std::iter::repeat_with(|| None)).map(Option::unwrap_or_default);
         self.planes.iter_mut().zip(single).map(|(sums, single)| CellPlane { rectangle, single, sums, room }).collect()
     }

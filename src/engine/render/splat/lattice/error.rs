@@ -11,7 +11,7 @@
 //! over the voxels that are present. P grows with every voxel, so it is largest for an infinite grid; there it is (sum
 //! of |E_i| + |sum of E_i|) / 2 at most. An emission has no such offset, and twice the error.
 //!
-//! Both sums are bounded slice by slice. Let A_u replace a function along u by its splines on the cells, filtered and
+//! Both sums are bounded slice by slice. Let A_u replace a function along u by its cells, filtered and
 //! summed with the kernel, and A_v the same along v. Then w~ = A_u A_v w, and
 //!
 //! ```text
@@ -26,12 +26,9 @@
 //! A ray meets at most K slices, so P <= K times the P of a slice. It is stated as a share of the largest sum of weights
 //! in the picture ([`super::picture`]). To this come the kernel's cut and the rounding to f32.
 
+use super::fit::{AxisFit, Spread};
 use super::kernel::Kernel;
-use super::prefilter::{HALF, Taps};
-use super::spline::spread;
-
-/// Cells per voxel, and the degree of the splines.
-pub(super) type Choice = [usize; 2];
+use super::prefilter::HALF;
 
 /// Upper bounds for an infinite slice of voxels, as shares of its largest sum of weights.
 #[derive(Debug, Clone, Copy)]
@@ -45,25 +42,25 @@ pub(in crate::render) struct SliceError {
 }
 
 impl SliceError {
-    /// The error of a choice of cells per voxel and degree of splines, filtered along u and v.
-    pub(super) fn new(weighting: &Weighting<'_>, choice: Choice, taps: &[Taps; 2]) -> Self {
-        Self::at_positions(weighting, choice, taps, 1)
+    /// The error with `fineness` cells per voxel, spread along u and v.
+    pub(super) fn new(weighting: &Weighting<'_>, fineness: usize, fits: &[AxisFit; 2]) -> Self {
+        Self::at_positions(weighting, fineness, fits, 1)
     }
 
     /// A lower bound of these bounds, from few positions.
-    pub(super) fn at_least(weighting: &Weighting<'_>, choice: Choice, taps: &[Taps; 2]) -> Self {
-        Self::at_positions(weighting, choice, taps, FEW)
+    pub(super) fn at_least(weighting: &Weighting<'_>, fineness: usize, fits: &[AxisFit; 2]) -> Self {
+        Self::at_positions(weighting, fineness, fits, FEW)
     }
 
-    fn at_positions(weighting: &Weighting<'_>, choice: Choice, taps: &[Taps; 2], step: usize) -> Self {
-        let Weighting { kernel, cut, additions } = *weighting;
+    fn at_positions(weighting: &Weighting<'_>, fineness: usize, fits: &[AxisFit; 2], step: usize) -> Self {
+        let Weighting { kernel, cut, roundings } = *weighting;
         let (marginal, conditional) = (kernel.sigmas(), kernel.conditional_sigmas());
-        let axis = |i: usize| Axis::new(choice, &taps[i], [conditional[i], marginal[i]], step);
+        let axis = |i: usize| Axis::new(fineness, &fits[i], [conditional[i], marginal[i]], step);
         let [u, v] = [axis(0), axis(1)];
         // Either axis may be replaced first.
         let both = |[eu, ev]: [f64; 2]| (eu + ev * u.blur).min(ev + eu * v.blur).min(product(kernel, [eu, ev]));
         let cut = cut * u.amplified * v.amplified;
-        let rounding = ROUNDING * (additions + OTHERS) as f64 * u.blur * v.blur;
+        let rounding = ROUNDING * roundings as f64 * u.blur * v.blur;
         let bound = |errors| both(errors) + cut + rounding;
         Self {
             sum: bound([u.sum, v.sum]),
@@ -96,14 +93,12 @@ pub(super) struct Weighting<'a> {
     pub(super) kernel: &'a Kernel,
     /// The share of its sum that its weights leave out.
     pub(super) cut: f64,
-    /// The largest number of additions for a cell of a plane.
-    pub(super) additions: usize,
+    /// The largest number of roundings to f32.
+    pub(super) roundings: usize,
 }
 
 /// Bound of the rounding of an addition in f32: 2^-24 of values at most twice the value range.
 const ROUNDING: f64 = 1.0 / (1_u64 << 23) as f64;
-/// Roundings besides the additions for a cell: 32 for the filters, 64 for a pixel, 8 for a weight.
-const OTHERS: usize = 104;
 
 /// Bounds along one axis, as shares of the largest sum of the Gaussian over an infinite row of voxels.
 #[derive(Debug, Clone, Copy, Default)]
@@ -129,22 +124,22 @@ const FEW: usize = 4;
 const MARGIN: f64 = 1.04;
 /// Voxels of the wave for which errors are estimated: finer structures are rarely much of a picture.
 const WAVE: isize = 8;
-/// Voxels farther than this many deviations and splines have no weight.
+/// Voxels farther than this many deviations and cells have no weight.
 const FAR: f64 = 8.0;
 
 impl Axis {
     /// The bounds for a Gaussian with a `conditional` and a `marginal` deviation in cells (eq 39).
-    fn new([fineness, degree]: Choice, taps: &Taps, [conditional, marginal]: [f64; 2], step: usize) -> Self {
+    fn new(fineness: usize, fit: &AxisFit, [conditional, marginal]: [f64; 2], step: usize) -> Self {
         let mut most = Self::default();
         let mut largest = [0.0_f64; 2];
         let tables = [conditional, marginal].map(Table::new);
         for voxel in (0..PHASES).step_by(step) {
             // Voxels lie at this cell and every `fineness` cells from it.
-            let (first, splines) = filtered(degree, taps, voxel as f64 / PHASES as f64);
-            let by_phase = |n: usize| splines.iter().skip(n).step_by(fineness).map(|w| w.abs()).sum::<f64>();
+            let (first, cells) = filtered(fit, voxel as f64 / PHASES as f64);
+            let by_phase = |n: usize| cells.iter().skip(n).step_by(fineness).map(|w| w.abs()).sum::<f64>();
             most.amplified = (0..fineness).map(by_phase).fold(most.amplified, f64::max);
             for pixel in (0..PHASES).step_by(step) {
-                let row = Row { voxel, pixel, fineness, first, splines: &splines };
+                let row = Row { voxel, pixel, fineness, first, cells: &cells };
                 let RowSums { sum, of_ones, of_wave, exact: weights, .. } = row.sums(&tables[0]);
                 let RowSums { blurred, exact: marginal_weights, .. } = row.sums(&tables[1]);
                 largest = [largest[0].max(weights), largest[1].max(marginal_weights)];
@@ -206,18 +201,18 @@ struct Row<'a> {
     fineness: usize,
     /// The first cell that the voxel reaches, and the weights of the cells from there on.
     first: isize,
-    splines: &'a [f64],
+    cells: &'a [f64],
 }
 
 impl Row<'_> {
     fn sums(&self, gaussian: &Table) -> RowSums {
-        let reach = ((gaussian.far + self.splines.len() as f64) / self.fineness as f64).ceil() as isize;
+        let reach = ((gaussian.far + self.cells.len() as f64) / self.fineness as f64).ceil() as isize;
         let mut sums = RowSums::default();
         for n in -reach..=reach {
             let at = self.pixel as isize - n * (self.fineness * PHASES) as isize;
             let exact = gaussian.at(at - self.voxel as isize);
             let (mut sum, mut blurred) = (0.0, 0.0);
-            for (cell, weight) in (self.first..).zip(self.splines) {
+            for (cell, weight) in (self.first..).zip(self.cells) {
                 let here = gaussian.at(at - cell * PHASES as isize);
                 sum += weight * here;
                 blurred += weight.abs() * here;
@@ -234,13 +229,13 @@ impl Row<'_> {
     }
 }
 
-/// The filtered spline of a voxel: the first cell that it reaches, and its weights.
-pub(super) fn filtered(degree: usize, taps: &Taps, voxel: f64) -> (isize, Vec<f64>) {
-    let (first, splines) = spread(degree, voxel);
-    let mut out = vec![0.0; degree + 1 + 2 * HALF];
-    for (n, weight) in splines[..=degree].iter().enumerate() {
+/// The filtered cells of a voxel: the first one that it reaches, and its weights.
+pub(super) fn filtered(fit: &AxisFit, voxel: f64) -> (isize, Vec<f64>) {
+    let Spread { first, weights } = fit.at(voxel);
+    let mut out = vec![0.0; fit.width + 2 * HALF];
+    for (n, weight) in weights[..fit.width].iter().enumerate() {
         for j in 0..=2 * HALF {
-            out[n + j] += weight * taps[j.abs_diff(HALF)];
+            out[n + j] += weight * fit.taps[j.abs_diff(HALF)];
         }
     }
     (first - HALF as isize, out)
@@ -248,8 +243,8 @@ pub(super) fn filtered(degree: usize, taps: &Taps, voxel: f64) -> (isize, Vec<f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::axis::Cut;
     use super::super::kernel::Weights;
-    use super::super::prefilter;
     use super::super::shear::Shear;
     use super::*;
     use wavesplat_core::base::grid::Grid;
@@ -257,40 +252,38 @@ mod tests {
 
     const SIGMA: f64 = 3.0;
 
-    fn kernel(azimuth: f64, elevation: f64, fineness: usize) -> (Shear, Kernel) {
+    fn kernel(azimuth: f64, elevation: f64, fineness: usize, radius: f64) -> (Shear, Kernel) {
         let grid = Grid::unit([20, 20, 20]);
         let view = View { azimuth, elevation, roll: 20.0, size: [100, 100], scale: Some(4.0), center: None };
         let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, fineness);
-        let kernel = Kernel::new(&shear, SIGMA, 4.8).expect("a kernel");
+        let kernel = Kernel::new(&shear, SIGMA, Cut { radius, phases: 1024 }).expect("a kernel");
         (shear, kernel)
     }
 
+    fn fits(kernel: &Kernel, width: usize) -> [AxisFit; 2] {
+        kernel.conditional_sigmas().map(|sigma| AxisFit::new(width, sigma))
+    }
+
     fn weighting(kernel: &Kernel) -> Weighting<'_> {
-        Weighting { kernel, cut: kernel.cut(), additions: 160 }
+        Weighting { kernel, cut: kernel.cut(), roundings: 264 }
     }
 
     #[test]
-    fn finer_cells_and_higher_degrees_are_nearer() {
+    fn finer_and_more_cells_are_nearer() {
         for (azimuth, elevation, most) in [(0.0, 0.0, 1.0), (30.0, 30.0, 1.0), (45.0, 35.26, 0.9)] {
-            for (fineness, degree, error) in [(2, 3, 2.3e-3), (2, 4, 8.5e-4), (2, 5, 6e-4), (3, 4, 3.5e-4)] {
-                let (_, kernel) = kernel(azimuth, elevation, fineness);
-                let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new(&weighting(&kernel), [fineness, degree], &taps).of_a_mean();
-                assert!(stated < most * error, "{fineness} {degree} at {azimuth}: {stated:e}");
+            for (fineness, width, error) in [(2, 4, 8e-4), (2, 5, 4e-4), (3, 5, 2e-5), (3, 6, 2e-5), (4, 6, 1e-5)] {
+                let (_, kernel) = kernel(azimuth, elevation, fineness, 6.0);
+                let weighting = Weighting { roundings: if fineness == 2 { 264 } else { 8 }, ..weighting(&kernel) };
+                let stated = SliceError::new(&weighting, fineness, &fits(&kernel, width)).of_a_mean();
+                assert!(stated < most * error, "{fineness} {width} at {azimuth}: {stated:e}");
             }
         }
     }
 
     /// The sums of |E_i| and of E_i of an infinite slice, as shares of its sum of weights, straight from the definition.
-    fn sums(
-        shear: &Shear,
-        kernel: &Kernel,
-        degree: usize,
-        taps: &[Taps; 2],
-        [slice, pixel]: [[f64; 2]; 2],
-    ) -> [f64; 2] {
+    fn sums(shear: &Shear, kernel: &Kernel, fits: &[AxisFit; 2], [slice, pixel]: [[f64; 2]; 2]) -> [f64; 2] {
         let q = shear.fineness as f64;
-        let splines = [0, 1].map(|i| filtered(degree, &taps[i], slice[i]));
+        let cells = [0, 1].map(|i| filtered(&fits[i], slice[i]));
         let mut weights = Weights::new(kernel);
         let (mut off, mut signed, mut all) = (0.0, 0.0, 0.0);
         for (n, m) in (-12..=12).flat_map(|n| (-12..=12).map(move |m| (f64::from(n), f64::from(m)))) {
@@ -298,12 +291,11 @@ mod tests {
             kernel.weights(at, &mut weights);
             let mut sum = 0.0;
             for (v, u, weights) in weights.rows() {
-                for (u, weight) in (u..).zip(weights) {
+                for (u, of_pixel) in (u..).zip(weights) {
                     let cell = [u, v];
-                    let spline =
-                        |a: usize| usize::try_from(cell[a] - splines[a].0).ok().and_then(|c| splines[a].1.get(c));
-                    if let (Some(along), Some(across)) = (spline(0), spline(1)) {
-                        sum += f64::from(*weight) * along * across;
+                    let weight = |a: usize| usize::try_from(cell[a] - cells[a].0).ok().and_then(|c| cells[a].1.get(c));
+                    if let (Some(along), Some(across)) = (weight(0), weight(1)) {
+                        sum += f64::from(*of_pixel) * along * across;
                     }
                 }
             }
@@ -316,19 +308,19 @@ mod tests {
     #[test]
     fn slices_are_off_by_no_more_than_stated() {
         for (azimuth, elevation) in [(0.0, 0.0), (3.0, 2.0), (17.0, 9.0), (30.0, 30.0), (45.0, 35.26), (100.0, -70.0)] {
-            for (fineness, degree) in [(1, 5), (2, 3), (2, 4), (2, 5), (3, 4)] {
-                let (shear, kernel) = kernel(azimuth, elevation, fineness);
-                let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-                let stated = SliceError::new(&weighting(&kernel), [fineness, degree], &taps);
+            for (fineness, width) in [(1, 4), (1, 5), (2, 4), (2, 5), (3, 5), (3, 6), (4, 6)] {
+                let (shear, kernel) = kernel(azimuth, elevation, fineness, 4.8);
+                let fits = fits(&kernel, width);
+                let stated = SliceError::new(&weighting(&kernel), fineness, &fits);
                 let mut most = [0.0_f64; 2];
                 for n in 0..81_u32 {
                     let at = |i: u32| f64::from(n / 3_u32.pow(i) % 3) / 3.0;
-                    let [off, signed] = sums(&shear, &kernel, degree, &taps, [[at(0), at(1)], [at(2), at(3)]]);
+                    let [off, signed] = sums(&shear, &kernel, &fits, [[at(0), at(1)], [at(2), at(3)]]);
                     most = [most[0].max(off), most[1].max(signed.abs())];
                 }
                 assert!(
                     most[0] <= stated.sum && most[1] <= stated.of_ones,
-                    "{fineness} {degree} at {azimuth}: {most:?}"
+                    "{fineness} {width} at {azimuth}: {most:?}"
                 );
                 assert!(most[0] > 0.25 * stated.sum || stated.sum < 1e-3, "{most:?} is far from {stated:?}");
             }

@@ -1,5 +1,6 @@
 //! The cells of a band after the prefilter (eq 36), with planes side by side.
 
+use super::Sums;
 use super::cells::{Aligned, Cells, LINE, PlaneSums, Rectangle, TOGETHER};
 use super::prefilter::{HALF, Taps};
 use rayon::prelude::*;
@@ -13,8 +14,10 @@ use wavesplat_core::codec::real::Real;
 pub(in crate::render) struct FilteredCells {
     pub(super) window: Window,
     /// The sums in f32, [`TOGETHER`] planes at most in each group.
-    pub(super) groups: Vec<Group>,
-    /// The sums in f64: the number of a plane, and its cells, row by row.
+    pub(super) groups: Vec<Group<f32>>,
+    /// The same if all sums are in f64.
+    pub(super) double_groups: Vec<Group<f64>>,
+    /// The sums in f64 of planes that have sums in f32, too: the number of a plane, and its cells, row by row.
     pub(super) doubles: Vec<(usize, Vec<f64>)>,
 }
 
@@ -29,7 +32,7 @@ pub(super) struct Window {
 
 /// Planes side by side, cell by cell.
 #[derive(Debug, Default)]
-pub(super) struct Group {
+pub(super) struct Group<R: Real> {
     /// The numbers of the planes; at most as many as there are places in a cell.
     pub(super) planes: Vec<usize>,
     /// Places in a cell: a power of two.
@@ -38,7 +41,7 @@ pub(super) struct Group {
     /// first-level cache.
     pub(super) stride: usize,
     /// The sums: cell by cell, row by row.
-    pub(super) cells: Zeroed<f32>,
+    pub(super) cells: Zeroed<R>,
     /// For each plane, the rows of cells with sums and their columns: of row v, from first to last.
     spans: Vec<Vec<Range<usize>>>,
 }
@@ -57,8 +60,13 @@ pub(super) fn side_by_side(planes: usize) -> usize {
 impl FilteredCells {
     /// Filters all planes along u and v. The sums of a group are freed before the next group is filtered.
     pub(super) fn new(cells: Cells, taps: &[Taps; 2]) -> Self {
-        let Cells { rectangle, single, planes } = cells;
+        let Cells { rectangle, single, planes, sums } = cells;
         let [along, across] = taps;
+        let window = Window { first: rectangle.first, size: rectangle.size };
+        if sums == Sums::Double {
+            let double_groups = double_groups(&rectangle, planes, taps);
+            return Self { window, double_groups, ..Self::default() };
+        }
         let of_group = |(n, (mut sums, planes)): (usize, (Zeroed<f32>, &[PlaneSums]))| {
             let numbered = (n * TOGETHER..).zip(planes.iter().zip(sums.chunks_exact_mut(rectangle.area().max(1))));
             let with_sums: Vec<_> = numbered.filter(|(_, (plane, _))| plane.has_single).collect();
@@ -72,8 +80,7 @@ impl FilteredCells {
         let filter = |(number, mut sums): (usize, Aligned<f64>)| {
             (number, filter_all_rows(&rectangle, &Rows::new(&rectangle, number, &mut sums, along), across))
         };
-        let window = Window { first: rectangle.first, size: rectangle.size };
-        Self { window, groups, doubles: doubles.map(filter).collect() }
+        Self { window, groups, double_groups: Vec::new(), doubles: doubles.map(filter).collect() }
     }
 }
 
@@ -91,7 +98,7 @@ impl Window {
     }
 }
 
-impl Group {
+impl<R: Real> Group<R> {
     /// Whether the plane in this place has sums in a part of the cells.
     pub(super) fn has_sums(&self, place: usize, columns: &Range<usize>, rows: &Range<usize>) -> bool {
         let overlaps = |span: &Range<usize>| span.start < columns.end && columns.start < span.end;
@@ -107,14 +114,27 @@ struct Rows<'a, R> {
     spans: Vec<Range<usize>>,
 }
 
+/// Filters planes whose sums are all in f64. The sums of a group are freed before the next group is filtered.
+fn double_groups(rectangle: &Rectangle, planes: Vec<PlaneSums>, [along, across]: &[Taps; 2]) -> Vec<Group<f64>> {
+    let (mut groups, mut planes) = (Vec::new(), planes.into_iter().enumerate().peekable());
+    while planes.peek().is_some() {
+        let numbered = planes.by_ref().take(TOGETHER).filter_map(|(number, plane)| Some((number, plane.double?)));
+        let mut sums: Vec<(usize, Aligned<f64>)> = numbered.collect();
+        let rows = sums.par_iter_mut().map(|(number, sums)| Rows::new(rectangle, *number, sums, along));
+        let rows: Vec<Rows<'_, f64>> = rows.filter(Rows::has_sums).collect();
+        groups.extend((!rows.is_empty()).then(|| group(rectangle, &rows, across)));
+    }
+    groups
+}
+
 /// Filters planes along v, and puts them side by side.
-fn group(rectangle: &Rectangle, planes: &[Rows<'_, f32>], taps: &Taps) -> Group {
-    let taps = taps.map(|tap| tap as f32);
+fn group<R: Real>(rectangle: &Rectangle, planes: &[Rows<'_, R>], taps: &Taps) -> Group<R> {
+    let taps = taps.map(R::from_f64);
     let [width, height] = rectangle.size;
     let (stride, places) = (width + 1, places(planes.len()));
     let mut cells = Zeroed::new(stride * height * places);
     cells.par_chunks_exact_mut((stride * places).max(1)).enumerate().for_each(|(v, cells)| {
-        let mut row = vec![0.0; width];
+        let mut row = vec![R::default(); width];
         for (place, plane) in planes.iter().enumerate() {
             if plane.is_near(v) {
                 plane.filter_row(v, width, &taps, &mut row);
@@ -151,6 +171,10 @@ impl<'a, R: Real> Rows<'a, R> {
         };
         let spans = sums.chunks_exact_mut(width.max(1)).map(of_row).collect();
         Self { number, sums, spans }
+    }
+
+    fn has_sums(&self) -> bool {
+        self.spans.iter().any(|span| !span.is_empty())
     }
 
     /// The rows that reach row v through the filter.

@@ -7,7 +7,7 @@
 //! w(p) = sum over cells c of G(p - c) T(c)        G(d) = exp(-(uu du^2 + 2 uv du dv + vv dv^2) / 2)        (eq 37)
 //! ```
 //!
-//! with T the filtered splines of a voxel, and uu, uv, vv the inverse of the footprint's covariance in cells. For a pixel
+//! with T the filtered weights of a voxel, and uu, uv, vv the inverse of the footprint's covariance in cells. For a pixel
 //! at (s, t) after a cell, the weight of the cell (m, n) beside it is a product of one factor for each column, one for
 //! each row, one for the pixel, and one that is the same for all pixels:
 //!
@@ -15,7 +15,7 @@
 //! G(s - m, t - n) = exp(-uu (s - m)^2 / 2 + uv m t) exp(-vv (t - n)^2 / 2 + uv n s) exp(-uv s t) exp(-uv m n)
 //! ```
 
-use super::axis::{PHASES, Phases, VECTOR, half, interpolated, split};
+use super::axis::{Cut, Phases, VECTOR, half, interpolated, split};
 use super::shear::Shear;
 use std::ops::Range;
 use wavesplat_core::base::vectors::dispatch;
@@ -39,9 +39,9 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// The kernel for a Gaussian with a standard deviation of `sigma` pixels, cut at `radius` deviations or beyond.
-    /// `None` if it is too large, or too narrow for numbers.
-    pub(super) fn new(shear: &Shear, sigma: f64, radius: f64) -> Option<Self> {
+    /// The kernel for a Gaussian with a standard deviation of `sigma` pixels. `None` if it is too large, or too narrow for
+    /// numbers.
+    pub(super) fn new(shear: &Shear, sigma: f64, Cut { radius, phases }: Cut) -> Option<Self> {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / (q * sigma)));
         let inverse = [b[0] * b[0] + b[1] * b[1], b[0] * c[0] + b[1] * c[1], c[0] * c[0] + c[1] * c[1]];
@@ -53,8 +53,8 @@ impl Kernel {
         }
         let gaussian = |i: f64| move |t: f64, n: isize| libm::exp(-0.5 * i * (t - n as f64) * (t - n as f64));
         let tilt = |t: f64, n: isize| libm::exp(uv * n as f64 * t);
-        let columns = [Phases::new(half[0], gaussian(uu)), Phases::new(half[0], tilt)];
-        let rows = [Phases::new(half[1], gaussian(vv)), Phases::new(half[1], tilt)];
+        let columns = [Phases::new(half[0], phases, gaussian(uu)), Phases::new(half[0], phases, tilt)];
+        let rows = [Phases::new(half[1], phases, gaussian(vv)), Phases::new(half[1], phases, tilt)];
         let number = |i: usize, n: usize| n as f64 + 1.0 - half[i] as f64;
         let cross = |n: usize| (0..columns[0].padded).map(move |m| libm::exp(-uv * number(0, m) * number(1, n)) as f32);
         let cross = (0..2 * half[1]).flat_map(cross).collect();
@@ -77,10 +77,11 @@ impl Kernel {
     pub(super) fn cut(&self) -> f64 {
         let places = || (0..PLACES).map(|n| n as f64 / (PLACES - 1) as f64);
         let left_out = |u: f64| places().map(move |v| self.left_out([u, v])).fold(0.0, f64::max);
-        let ([u, v], uv) = (self.sigmas(), self.inverse[1].abs() / PHASES as f64);
-        // exp(uv m t) is off by (uv m / PHASES)^2 / 8; m is off the pixel by the deviation along its axis.
+        let phases = self.columns[0].phases;
+        let ([u, v], uv) = (self.sigmas(), self.inverse[1].abs() / phases as f64);
+        // exp(uv m t) is off by (uv m / phases)^2 / 8; m is off the pixel by the deviation along its axis.
         let tilts: f64 = [u, v].map(|sigma| uv * uv * (sigma * sigma + 1.0) / 8.0).iter().sum();
-        let gaussians: f64 = self.conditional_sigmas().map(interpolated).iter().sum();
+        let gaussians: f64 = self.conditional_sigmas().map(|sigma| interpolated(sigma, phases)).iter().sum();
         MARGIN * places().map(left_out).fold(0.0, f64::max) + gaussians + tilts
     }
 
@@ -253,13 +254,17 @@ mod tests {
     use wavesplat_core::base::grid::Grid;
     use wavesplat_core::view::camera::{Camera, View};
 
+    fn cut(radius: f64) -> Cut {
+        Cut { radius, phases: 256 }
+    }
+
     #[test]
     fn kernels_beyond_numbers_are_refused() {
         let grid = Grid::unit([128; 3]);
         let view = View { azimuth: 30.0, elevation: 30.0, roll: 10.0, size: [512; 2], scale: Some(2.3), center: None };
         let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, 1);
         for sigma in [1e-3, 0.03, 0.1, 0.3, 1.0, 3.0] {
-            let Some(kernel) = Kernel::new(&shear, sigma * 2.3, 3.5) else { continue };
+            let Some(kernel) = Kernel::new(&shear, sigma * 2.3, cut(3.5)) else { continue };
             let mut weights = Weights::new(&kernel);
             for position in [[0.0, 0.0], [0.4, 0.9], [0.99, 0.01]] {
                 kernel.weights(position, &mut weights);
@@ -267,7 +272,9 @@ mod tests {
                 assert!(weights.rows().all(|(_, _, row)| finite(row)), "{sigma}");
             }
         }
-        assert!(Kernel::new(&shear, 0.03 * 2.3, 3.5).is_none() && Kernel::new(&shear, 0.75 * 2.3, 3.5).is_some());
+        assert!(
+            Kernel::new(&shear, 0.03 * 2.3, cut(3.5)).is_none() && Kernel::new(&shear, 0.75 * 2.3, cut(3.5)).is_some()
+        );
     }
 
     #[test]
@@ -277,7 +284,7 @@ mod tests {
             let view = View { azimuth, elevation, roll: 7.0, size: [50, 50], scale: Some(4.0), center: None };
             let camera = Camera::new(&view, &grid).expect("a valid view");
             let shear = Shear::new(&camera, &grid, 2);
-            let kernel = Kernel::new(&shear, sigma, 4.5).expect("a wide kernel");
+            let kernel = Kernel::new(&shear, sigma, cut(4.5)).expect("a wide kernel");
             let mut weights = Weights::new(&kernel);
             let (half, reach) = (kernel.half(), kernel.reach(&shear, sigma));
             for position in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {

@@ -2,23 +2,23 @@
 //! voxel.
 //!
 //! ```text
-//! values of a block, plane by plane     spread: to the cells around each voxel, by B-splines
-//! cells of a band of the picture        filtered: a short filter undoes the blur of the B-splines
+//! values of a block, plane by plane     spread: to the cells around each voxel, by weights that are fitted
+//! cells of a band of the picture        filtered: a short filter undoes the blur of spreading
 //! filtered cells of a tile              gather: to pixels, by the Gaussian footprint
 //! ```
 //!
 //! This is the lattice of the shear-warp factorization ([Lacroute](wavesplat_core::bibliography)): the voxels of a slice
 //! perpendicular to the principal axis are whole cells apart (eq 35, `shear`). So they all have the same weights, and a
 //! block costs a few products per voxel, however wide footprints are in pixels. The cost of a pixel depends only on its
-//! number of cells. Nonuniform Fourier transforms place samples on a grid in the same way: they spread by splines and
-//! correct for the splines afterwards (eq 36, `prefilter`; [Greengard](wavesplat_core::bibliography)). `error` states by how much
-//! a pixel can be off.
+//! number of cells. Nonuniform Fourier transforms place samples on a grid in the same way: they spread by a bump and
+//! correct for it afterwards (eq 36, `prefilter`; [Greengard](wavesplat_core::bibliography)). Here the correction comes first, and the
+//! weights of voxels are fitted to it (eq 45, `fit`). `error` states by how much a pixel can be off.
 //!
 //! Each plane has one owner and adds blocks in file order, so sums depend neither on threads nor on memory.
 
 mod shear;
-mod spline;
 mod prefilter;
+mod fit;
 mod axis;
 mod kernel;
 mod error;
@@ -45,11 +45,76 @@ pub(super) use picture::{Lattice, SplattedView};
 pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, SpreadScratch};
 
-/// How values are spread over the cells of a view.
+use fit::{AxisFit, Spread};
+
+/// A way to spread voxels.
 #[derive(Debug, Clone, Copy)]
+struct Choice {
+    /// Cells per voxel along an axis.
+    fineness: usize,
+    /// Cells that a voxel is spread to along an axis.
+    width: usize,
+    sums: Sums,
+}
+
+impl Choice {
+    const fn new(fineness: usize, width: usize, sums: Sums) -> Self {
+        Self { fineness, width, sums }
+    }
+}
+
+/// The type of the sums of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sums {
+    /// f32, for values of ordinary size.
+    Single,
+    /// f64.
+    Double,
+}
+
+impl Sums {
+    /// Positions between two cells for which the weights of pixels are tabulated.
+    fn phases(self) -> usize {
+        match self {
+            Self::Single => 256,
+            Self::Double => 1024,
+        }
+    }
+}
+
+/// How values are spread over the cells of a view.
+#[derive(Debug)]
 struct Spreading {
     shear: Shear,
-    /// Degree of the B-splines.
-    degree: usize,
+    sums: Sums,
+    /// The weights and prefilters along u and v.
+    fits: [AxisFit; 2],
     tau: f64,
+    /// For each slice of the grid, the cells along u and v of its voxel that is the first along b and c.
+    spreads: [Vec<Spread>; 2],
+}
+
+impl Spreading {
+    /// Spreads voxels for a Gaussian with these standard deviations in cells. The grid has `slices` slices.
+    fn new(shear: Shear, choice: Choice, sigmas: [f64; 2], tau: f64, slices: usize) -> Self {
+        let fits = sigmas.map(|sigma| AxisFit::new(choice.width, sigma));
+        let position = |i: usize, slice: usize| shear.fineness as f64 * shear.slopes[i] * slice as f64;
+        let spreads = [0, 1].map(|i| (0..slices).map(|slice| fits[i].at(position(i, slice))).collect());
+        Self { shear, sums: choice.sums, fits, tau, spreads }
+    }
+
+    /// Cells that a voxel is spread to along an axis.
+    fn width(&self) -> usize {
+        self.fits[0].width
+    }
+
+    /// The cells along u and v that a voxel is spread to.
+    fn spread(&self, voxel: [usize; 3]) -> [Spread; 2] {
+        let [b, c, a] = self.shear.axes.map(|axis| voxel[axis]);
+        let shifted = |i: usize, n: usize| {
+            let Spread { first, weights } = self.spreads[i][a];
+            Spread { first: first + (self.shear.fineness * n) as isize, weights }
+        };
+        [shifted(0, b), shifted(1, c)]
+    }
 }

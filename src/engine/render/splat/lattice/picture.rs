@@ -1,17 +1,19 @@
 //! The lattice of one view as a splat backend. A view uses it if its stated error is small enough and it is less work
 //! than footprints.
 
+use super::axis::Cut;
 use super::cells::{Cells, LINE, Rectangle};
-use super::error::{Choice, SliceError, Weighting};
+use super::error::{SliceError, Weighting};
 use super::filtered::{FilteredCells, Window, places, side_by_side};
+use super::fit::{AxisFit, MOST_WIDTH};
 use super::kernel::Kernel;
-use super::prefilter::{self, HALF, Taps};
+use super::prefilter::HALF;
 use super::product::Product;
 use super::shear::Shear;
-use super::spline::{MOST_DEGREE, spread};
-use super::{Placed, Spreading};
-use crate::render::splat::tile_rect::{TILE, TileRect, pixels_around};
+use super::{Choice, Placed, Spreading, Sums};
+use crate::render::splat::tile_rect::{TileRect, pixels_around};
 use std::ops::Range;
+use std::sync::Arc;
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
 use wavesplat_core::view::camera::Camera;
 use wavesplat_core::view::footprint::{Footprint, Kernel as Gaussian, Method};
@@ -19,12 +21,10 @@ use wavesplat_core::view::footprint::{Footprint, Kernel as Gaussian, Method};
 /// The lattice of a view.
 #[derive(Debug, Clone)]
 pub(in crate::render) struct Lattice {
-    spreading: Spreading,
+    spreading: Arc<Spreading>,
     pub(super) kernel: Kernel,
     /// The kernel as a product, if it is one.
     pub(super) product: Option<Product>,
-    /// The prefilters along u and v.
-    taps: [Taps; 2],
     /// Reach of the footprint in pixels: farther cells do not influence a pixel.
     reach: f64,
     /// f at its centre.
@@ -35,8 +35,8 @@ pub(in crate::render) struct Lattice {
     bounds: ([isize; 2], [usize; 2]),
 }
 
-/// A bound for a kernel, a choice, and its prefilters.
-type Bound = fn(&Weighting<'_>, Choice, &[Taps; 2]) -> SliceError;
+/// A bound for a kernel, cells per voxel, and the spreading along u and v.
+type Bound = fn(&Weighting<'_>, usize, &[AxisFit; 2]) -> SliceError;
 
 /// A view that may be splatted on a lattice.
 #[derive(Debug, Clone, Copy)]
@@ -60,14 +60,29 @@ impl SplattedView<'_> {
     /// Products for a plane with a footprint for each voxel.
     fn footprint_work(&self) -> f64 {
         let side = |pixels: usize| (2.0 * self.footprint.reach + 1.0).min(pixels as f64);
-        self.clip.voxels() as f64 * side(self.camera.size[0]) * side(self.camera.size[1])
+        self.clip.voxels() as f64 * (FOOTPRINT + side(self.camera.size[0]) * side(self.camera.size[1]))
     }
 }
 
-/// Cells per voxel and degrees of splines, roughly from the cheapest on.
-const CHOICES: [Choice; 8] = [[1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5], [3, 4], [4, 5]];
+/// The choices, from the cheapest on.
+const CHOICES: [Choice; 10] = [
+    Choice::new(1, 4, Sums::Single),
+    Choice::new(1, 5, Sums::Single),
+    Choice::new(2, 4, Sums::Single),
+    Choice::new(2, 5, Sums::Single),
+    Choice::new(3, 5, Sums::Single),
+    Choice::new(1, 5, Sums::Double),
+    Choice::new(2, 5, Sums::Double),
+    Choice::new(3, 5, Sums::Double),
+    Choice::new(3, 6, Sums::Double),
+    Choice::new(4, 6, Sums::Double),
+];
 /// The largest exponent by which weights change from one voxel to the next: rounding grows with its cube.
 const STEEPEST: f64 = 0.5;
+/// The largest slope of slices, in voxels.
+const STEEPEST_SLOPE: f64 = 32.0;
+/// Beyond this number of cells per pixel, every pixel sums its own cells.
+const FAR: f64 = 8.0;
 /// The largest number of cells that a square tile reaches.
 const TILE_CELLS: usize = 4096;
 /// Width of a tile in units of its height, if pixels are summed in two passes.
@@ -109,18 +124,20 @@ impl Lattice {
 
     /// The lattice of a choice, with a kernel that is cut at `radius` standard deviations; `None` if footprints are less
     /// work, or it does not suit.
-    fn new([fineness, degree]: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
+    fn new(choice: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
         let sigma = view.sigma();
         let SplattedView { grid, clip, blocks, camera, footprint, .. } = *view;
-        let shear = Shear::new(camera, grid, fineness);
-        let kernel = Kernel::new(&shear, sigma, radius)?;
-        let spreading = Spreading { shear, degree, tau: view.kernel.tau };
-        let taps = kernel.sigmas().map(|sigma| prefilter::taps(degree, sigma));
-        let product = Product::new(&shear, sigma, radius);
+        let shear = Shear::new(camera, grid, choice.fineness);
+        let cut = Cut { radius, phases: choice.sums.phases() };
+        let kernel = Kernel::new(&shear, sigma, cut)?;
+        let slices = grid.dims[shear.axes[2]];
+        let spreading = Spreading::new(shear, choice, kernel.conditional_sigmas(), view.kernel.tau, slices);
+        let product = Product::new(&shear, sigma, cut).filter(|_| !is_far(&shear));
         let reach = product.as_ref().map_or_else(|| kernel.reach(&shear, sigma), |product| product.reach(&shear));
         let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
         let additions = additions(clip, blocks, shear.axes[2]);
-        let mut lattice = Self { spreading, kernel, product, taps, reach, peak, additions, bounds };
+        let spreading = Arc::new(spreading);
+        let mut lattice = Self { spreading, kernel, product, reach, peak, additions, bounds };
         if !lattice.suits() || lattice.work(camera, clip) > view.footprint_work() {
             return None;
         }
@@ -131,8 +148,12 @@ impl Lattice {
     /// The error of a slice, by one of the bounds.
     fn slice_error(&self, bound: Bound) -> SliceError {
         let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
-        let choice = [self.spreading.shear.fineness, self.spreading.degree];
-        bound(&Weighting { kernel: &self.kernel, cut, additions: self.additions }, choice, &self.taps)
+        let Spreading { shear, fits, sums, .. } = self.spreading.as_ref();
+        let roundings = match sums {
+            Sums::Single => self.additions + OTHERS + OF_A_WEIGHT,
+            Sums::Double => OF_A_WEIGHT,
+        };
+        bound(&Weighting { kernel: &self.kernel, cut, roundings }, shear.fineness, fits)
     }
 
     fn suits(&self) -> bool {
@@ -151,20 +172,21 @@ impl Lattice {
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
         let positions = [self.position([0.0; 2]), self.half()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
-        per_pixel.iter().chain([&shear.slopes]).all(|n| within(n, TILE as f64))
+        within(&shear.slopes, STEEPEST_SLOPE)
+            && per_pixel.iter().all(|n| within(n, 1e6))
             && positions.iter().all(|n| within(n, 1e9))
     }
 
     /// Estimated work for a plane, in products of a footprint.
     fn work(&self, camera: &Camera, clip: &Region) -> f64 {
-        let (degree, q) = (self.spreading.degree as f64, self.spreading.shear.fineness as f64);
+        let (width, q) = (self.spreading.width() as f64, self.spreading.shear.fineness as f64);
         let [b, c] = self.spreading.shear.pixels.map(|step| step.map(|pixels| pixels / q));
         let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
         let (pixels, tile) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
         let copied = area(self.tile_cells(tile)) as f64 * pixels / area(tile) as f64;
         GATHERING * self.kernel.cells() as f64 * pixels
             + COPYING * copied
-            + SPREADING * clip.voxels() as f64 * (degree + 1.0) * (q + 1.0)
+            + SPREADING * clip.voxels() as f64 * width * (q + 1.0)
     }
 
     /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
@@ -177,16 +199,15 @@ impl Lattice {
 
     /// The cells that the voxels of a region reach: the first along each axis, and their number.
     fn rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
-        let Spreading { shear, degree, .. } = self.spreading;
         let (mut low, mut high) = ([isize::MAX; 2], [isize::MIN; 2]);
         for corner in 0..8 {
             let at = |axis: usize| if corner >> axis & 1 == 0 { region.start[axis] } else { region.end[axis] - 1 };
-            let first = shear.position(std::array::from_fn(at)).map(|position| spread(degree, position).0);
+            let first = self.spreading.spread(std::array::from_fn(at)).map(|spread| spread.first);
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(first[i]), high[i].max(first[i])));
         }
         // One more cell covers rounding, and cells beyond the cut that count as well.
         let pad = 1;
-        let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + degree + 1;
+        let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + self.spreading.width();
         (low.map(|first| first - pad as isize), [size(0), size(1)])
     }
 
@@ -201,9 +222,10 @@ impl Lattice {
         self.product.as_ref().map_or_else(|| self.kernel.half(), Product::half)
     }
 
-    /// The cells of a rectangle of pixels: the first along each axis, and their number.
+    /// The cells of the centres of a rectangle of pixels: the first along each axis, and their number.
     pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> ([isize; 2], [usize; 2]) {
-        let corners = [x.start, x.end].into_iter().flat_map(|x| [y.start, y.end].map(move |y| [x as f64, y as f64]));
+        let [x, y] = [x, y].map(|pixels| [pixels.start as f64 + 0.5, pixels.end as f64 - 0.5]);
+        let corners = x.into_iter().flat_map(|x| y.map(move |y| [x, y]));
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for position in corners.map(|pixel| self.position(pixel)) {
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
@@ -248,12 +270,12 @@ impl Lattice {
         let start = [0, 1].map(|i| (first[i] - HALF as isize).max(low[i]));
         let end = |i: usize| (first[i] + (size[i] + HALF) as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
-        Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes)
+        Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes, self.spreading.sums)
     }
 
     /// The filtered cells of a band.
     pub(in crate::render) fn filter(&self, cells: Cells) -> FilteredCells {
-        FilteredCells::new(cells, &self.taps)
+        FilteredCells::new(cells, &self.spreading.fits.each_ref().map(|fit| fit.taps))
     }
 
     /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. In two passes, the pixels of a row share the sums of columns, so tiles are wide.
@@ -268,13 +290,22 @@ impl Lattice {
         self.cells_reached(&(0..width), &(0..height)).1
     }
 
-    /// An upper bound of the bytes for the planes of a band in f32: their sums, and a group of them side by side.
+    /// An upper bound of the bytes for the planes of a band: their sums, and a group of them side by side.
     pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
-        (planes + places(planes)) * self.band_cells(width, rows) * size_of::<f32>()
+        let number = match self.spreading.sums {
+            Sums::Single => size_of::<f32>(),
+            Sums::Double => size_of::<f64>(),
+        };
+        (planes + places(planes)) * self.band_cells(width, rows) * number
+    }
+
+    /// An upper bound of the bytes for a plane of a band in f64, if it has sums in f32, too.
+    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
+        if self.spreading.sums == Sums::Double { 0 } else { self.plane_bytes(width, rows) }
     }
 
     /// An upper bound of the bytes for a plane of a band in f64.
-    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
+    pub(in crate::render) fn plane_bytes(&self, width: usize, rows: usize) -> usize {
         self.band_cells(width, rows) * size_of::<f64>()
     }
 
@@ -287,7 +318,7 @@ impl Lattice {
     /// An upper bound of the cells of a plane of a block.
     pub(in crate::render) fn block_cells(&self, region: &Region) -> usize {
         let size = self.rectangle(region).1;
-        self.held(size.map(|n| n + MOST_DEGREE + self.spreading.shear.fineness))
+        self.held(size.map(|n| n + MOST_WIDTH - 1 + self.spreading.shear.fineness))
     }
 
     /// An upper bound of the stored cells for a rectangle of `size` cells: rows are whole cache lines for each phase.
@@ -297,13 +328,18 @@ impl Lattice {
 }
 
 /// The choice for a quick look, and the cut of its kernel in standard deviations.
-const QUICK: Choice = [1, 3];
+const QUICK: Choice = Choice::new(1, 4, Sums::Single);
 const QUICK_RADIUS: f64 = 3.5;
 /// The share of the error that is left for the cut of the kernel.
 const CUT: f64 = 0.03;
-/// Smaller errors are below what sums in f32 can promise.
-const LEAST: f64 = 3e-5;
+/// Smaller errors are below what weights in f32 can promise.
+const LEAST: f64 = 3e-6;
+/// Roundings to f32 besides the additions for a cell, 32 for the filters and 64 for a pixel; and those of a weight.
+const OTHERS: usize = 96;
+const OF_A_WEIGHT: usize = 8;
 
+/// The measured cost of a footprint of a single pixel, in products.
+const FOOTPRINT: f64 = 20.0;
 /// The measured costs of a product from cells to pixels (weights included), of copying a cell into a tile, and of a
 /// product from voxels to cells, in units of a product of a footprint.
 const GATHERING: f64 = 0.5;
@@ -318,7 +354,12 @@ const LARGEST: f64 = 0.05;
 fn additions(clip: &Region, blocks: BlockGrid, axis: usize) -> usize {
     let dims = clip.dims();
     let met: usize = (0..3).map(|a| dims[a].div_ceil(blocks.edges[a]) + 1).sum();
-    blocks.edges[axis].min(dims[axis]) + 2 * (MOST_DEGREE + 1) + 4 * met
+    blocks.edges[axis].min(dims[axis]) + 2 * MOST_WIDTH + 4 * met
+}
+
+/// Whether a step of a pixel passes so many cells that the pixels of a row share few of them.
+fn is_far(shear: &Shear) -> bool {
+    shear.cells([1.0, 0.0])[0].abs() > FAR
 }
 
 fn area([width, height]: [usize; 2]) -> usize {

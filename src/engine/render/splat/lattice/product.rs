@@ -9,7 +9,7 @@
 //!
 //! with u_x the position of column x of pixels, and v_y(u) the position at which row y of pixels crosses column u.
 
-use super::axis::AxisKernel;
+use super::axis::{AxisKernel, Cut};
 use super::shear::Shear;
 
 /// The kernel of a view as a product.
@@ -24,16 +24,15 @@ pub(super) struct Product {
 }
 
 impl Product {
-    /// The kernel for a Gaussian with a standard deviation of `sigma` pixels, cut at `radius` deviations; `None` if it
-    /// is no product, or too large.
-    pub(super) fn new(shear: &Shear, sigma: f64, radius: f64) -> Option<Self> {
+    /// The kernel for a Gaussian with a standard deviation of `sigma` pixels; `None` if it is no product, or too large.
+    pub(super) fn new(shear: &Shear, sigma: f64, cut: Cut) -> Option<Self> {
         let q = shear.fineness as f64;
         let [b, c] = shear.pixels.map(|step| step.map(|pixels| pixels / q));
         if c[0].abs() > UPRIGHT * c[1].abs() {
             return None;
         }
-        let along = AxisKernel::new(sigma / b[0].abs(), radius)?;
-        let across = AxisKernel::new(sigma / c[1].abs(), radius)?;
+        let along = AxisKernel::new(sigma / b[0].abs(), cut)?;
+        let across = AxisKernel::new(sigma / c[1].abs(), cut)?;
         let [x, y, _] = shear.origin;
         Some(Self { along, across, u: [-x / b[0], 1.0 / b[0]], v: [-y / c[1], 1.0 / c[1], -b[1] / c[1]] })
     }

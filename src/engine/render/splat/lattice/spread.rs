@@ -1,18 +1,18 @@
-//! Spreads the values of a block's voxels to the cells around them, by B-splines at the positions of eq 35.
+//! Spreads the values of a block's voxels to the cells around them, by the weights of eq 45 at the positions of eq 35.
 //!
 //! All voxels of a slice perpendicular to the principal axis have the same weights. So a row of voxels is convolved
 //! with the weights along u, once for each phase, and a row of cells is a sum of such rows times the weights along v.
-//! A block is summed in f32, then added to its plane. Values that are large compared with their range are spread less
+//! A block is summed by itself, then added to its plane. In f32, values that are large compared with their range are spread less
 //! their middle, and the middle by the cells of a block of ones in f64.
 
-use super::Spreading;
 use super::block_values::{BlockValues, fits_single};
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
+use super::fit::{CellWeights, MOST_WIDTH};
 use super::shear::Shear;
-use super::spline::{MOST_DEGREE, Spread, spread};
+use super::{Spreading, Sums};
 use crate::render::batches::PlaneValues;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::vectors::dispatch;
 use wavesplat_core::codec::real::Real;
@@ -20,7 +20,7 @@ use wavesplat_core::codec::real::Real;
 /// The location of a block's voxels in cells, the same for all planes.
 #[derive(Debug)]
 pub(in crate::render) struct Placed {
-    spreading: Spreading,
+    spreading: Arc<Spreading>,
     /// The block, and the part of it that counts.
     region: Region,
     clip: Region,
@@ -45,16 +45,23 @@ pub(in crate::render) struct Placed {
 struct Slice {
     /// The first cell that the first voxel reaches.
     cell: [isize; 2],
-    along: Spread,
+    along: CellWeights,
     /// Weights along v, times exp(-tau z) of the first voxel in units of the block's nearest one.
-    across: Spread,
+    across: CellWeights,
     /// The voxels along b and along c that reach cells of the planes.
     voxels: [Range<usize>; 2],
 }
 
+/// Scratch for spreading blocks.
+#[derive(Debug, Default)]
+pub(in crate::render) struct SpreadScratch {
+    single: BlockScratch<f32>,
+    double: BlockScratch<f64>,
+}
+
 /// Scratch for spreading a block.
 #[derive(Debug, Default)]
-pub(in crate::render) struct SpreadScratch<R> {
+struct BlockScratch<R> {
     /// Rows of values times their fading, with zeros on both sides.
     faded: Vec<R>,
     /// The block's own cells.
@@ -68,7 +75,7 @@ pub(in crate::render) struct SpreadScratch<R> {
 
 impl Placed {
     /// Locates the block at `region`, limited to the voxels in `clip`. `extent` gives the cells of the planes.
-    pub(super) fn new(spreading: &Spreading, region: &Region, clip: &Region, extent: &Rectangle) -> Self {
+    pub(super) fn new(spreading: &Arc<Spreading>, region: &Region, clip: &Region, extent: &Rectangle) -> Self {
         let (clip, shear) = (region.intersect(clip), &spreading.shear);
         let (dims, block) = (clip.dims(), region.dims());
         let stride = |axis: usize| block[..axis].iter().product::<usize>();
@@ -82,7 +89,7 @@ impl Placed {
         let slice = |k| Slice::new(clip.start, nearest, spreading, k, [count[0], count[1]], extent);
         let slices: Vec<Slice> = (0..count[2]).map(slice).collect();
         Self {
-            spreading: *spreading,
+            spreading: spreading.clone(),
             rectangle: rectangle_of(&slices, spreading, [count[0], count[1]]),
             slices,
             count,
@@ -101,7 +108,7 @@ impl Placed {
         &self,
         values: PlaneValues<'_>,
         plane: &mut CellPlane<'_>,
-        scratch: &mut SpreadScratch<f32>,
+        scratch: &mut SpreadScratch,
     ) {
         match values {
             PlaneValues::Nothing => {}
@@ -114,34 +121,39 @@ impl Placed {
     }
 
     /// Adds dense values through the block's own cells, which stay in the second-level cache.
-    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, scratch: &mut SpreadScratch<f32>) {
+    fn add_all<R: Real>(&self, values: &[R], plane: &mut CellPlane<'_>, scratch: &mut SpreadScratch) {
         let values = BlockValues::new(values);
         if values.middle != 0.0 {
             let ones = self.ones.get_or_init(|| self.spread_ones());
             plane.add_double(&self.rectangle, ones, values.middle * self.nearest);
         }
-        if values.scale != 0.0 {
-            let (sums, scale) = (self.spread(&values, scratch), values.scale * self.nearest);
-            if values.scale == 1.0 && fits_single(values.largest * self.nearest) {
-                plane.add_single(&self.rectangle, &sums, scale as f32);
-            } else {
-                plane.add_double(&self.rectangle, &sums, scale);
-            }
-            scratch.sums = sums;
+        let scale = values.scale * self.nearest;
+        if values.scale == 0.0 {
+            return;
         }
+        if self.spreading.sums == Sums::Double {
+            let sums = self.spread(&values, &mut scratch.double);
+            plane.add_double(&self.rectangle, &sums, scale);
+            scratch.double.sums = sums;
+            return;
+        }
+        let sums = self.spread(&values, &mut scratch.single);
+        if values.scale == 1.0 && fits_single(values.largest * self.nearest) {
+            plane.add_single(&self.rectangle, &sums, scale as f32);
+        } else {
+            plane.add_double(&self.rectangle, &sums, scale);
+        }
+        scratch.single.sums = sums;
     }
 
     /// The cells of the value 1 at all voxels, in f64.
     fn spread_ones(&self) -> Aligned<f64> {
         let ones = vec![1.0; self.region.voxels()];
-        self.spread(
-            &BlockValues { values: &ones, middle: 0.0, scale: 1.0, largest: 1.0 },
-            &mut SpreadScratch::default(),
-        )
+        self.spread(&BlockValues { values: &ones, middle: 0.0, scale: 1.0, largest: 1.0 }, &mut BlockScratch::default())
     }
 
     /// The block's own cells.
-    fn spread<R: Real, S: Real>(&self, values: &BlockValues<'_, R>, scratch: &mut SpreadScratch<S>) -> Aligned<S> {
+    fn spread<R: Real, S: Real>(&self, values: &BlockValues<'_, R>, scratch: &mut BlockScratch<S>) -> Aligned<S> {
         let area = self.rectangle.area();
         let mut sums = std::mem::take(&mut scratch.sums);
         if sums.len() != area {
@@ -153,7 +165,7 @@ impl Placed {
     }
 
     fn add_one(&self, voxel: u32, value: f64, plane: &mut CellPlane<'_>) {
-        let Spreading { shear, degree, tau } = &self.spreading;
+        let Spreading { shear, tau, sums, .. } = self.spreading.as_ref();
         let voxel = self.region.voxel(voxel as usize);
         if !(0..3).all(|a| (self.clip.start[a]..self.clip.end[a]).contains(&voxel[a])) {
             return;
@@ -162,12 +174,14 @@ impl Placed {
         if value == 0.0 {
             return;
         }
-        let [(u, along), (v, across)] = shear.position(voxel).map(|position| spread(*degree, position));
-        for (v, across) in (v..).zip(&across[..=*degree]) {
+        let ([u, v], width) = (self.spreading.spread(voxel), self.spreading.width());
+        for (v, across) in (v.first..).zip(&v.weights[..width]) {
             let Some(row) = plane.rectangle.row(v) else { continue };
-            for (u, along) in (u..).zip(&along[..=*degree]) {
+            for (u, along) in (u.first..).zip(&u.weights[..width]) {
                 match plane.rectangle.in_row(u) {
-                    Some(at) if fits_single(value) => plane.single()[row.start + at] += (value * across * along) as f32,
+                    Some(at) if *sums == Sums::Single && fits_single(value) => {
+                        plane.single()[row.start + at] += (value * across * along) as f32;
+                    }
                     Some(at) => plane.double()[row.start + at] += value * across * along,
                     None => {}
                 }
@@ -188,11 +202,11 @@ impl Slice {
     ) -> Self {
         let mut voxel = start;
         voxel[spreading.shear.axes[2]] += k;
-        let [u, v] = spreading.shear.position(voxel).map(|position| spread(spreading.degree, position));
+        let [u, v] = spreading.spread(voxel);
         let fading = libm::exp(-spreading.tau * (spreading.shear.depth(voxel) - nearest));
-        let cell = [u.0, v.0];
-        let voxels = [0, 1].map(|i| extent.voxels_reaching(i, cell[i], spreading.degree, count[i]));
-        Self { cell, along: u.1, across: v.1.map(|w| w * fading), voxels }
+        let cell = [u.first, v.first];
+        let voxels = [0, 1].map(|i| extent.voxels_reaching(i, cell[i], spreading.width(), count[i]));
+        Self { cell, along: u.weights, across: v.weights.map(|w| w * fading), voxels }
     }
 }
 
@@ -209,7 +223,7 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
         let cells = || slices.iter().map(|s| s.cell[i]);
         let (low, high) = (cells().min().unwrap_or(0), cells().max().unwrap_or(0));
         // Includes the zeros that pad rows with fewer taps.
-        (low, (high - low) as usize + q * count[i].saturating_sub(1) + MOST_DEGREE + 1 + q)
+        (low, (high - low) as usize + q * count[i].saturating_sub(1) + MOST_WIDTH + q)
     };
     let (u, v) = (range(0), range(1));
     Rectangle::holding([u.0, v.0], [u.1, v.1], q)
@@ -220,12 +234,12 @@ fn add_block<R: Real, S: Real>(
     placed: &Placed,
     values: &BlockValues<'_, R>,
     sums: &mut [S],
-    scratch: &mut SpreadScratch<S>,
+    scratch: &mut BlockScratch<S>,
 ) {
-    let Spreading { shear, degree, .. } = &placed.spreading;
-    match (shear.fineness, (degree + 1).div_ceil(shear.fineness)) {
+    let (fineness, width) = (placed.spreading.shear.fineness, placed.spreading.width());
+    match (fineness, width.div_ceil(fineness)) {
         (1, ..=4) => add_slices::<R, S, 1, 4>(placed, values, sums, scratch),
-        (1, _) => add_slices::<R, S, 1, 6>(placed, values, sums, scratch),
+        (1, _) => add_slices::<R, S, 1, 5>(placed, values, sums, scratch),
         (2, ..=2) => add_slices::<R, S, 2, 2>(placed, values, sums, scratch),
         (2, _) => add_slices::<R, S, 2, 3>(placed, values, sums, scratch),
         (3, _) => add_slices::<R, S, 3, 2>(placed, values, sums, scratch),
@@ -239,7 +253,7 @@ fn add_slices<R: Real, S: Real, const Q: usize, const TAPS: usize>(
     placed: &Placed,
     values: &BlockValues<'_, R>,
     sums: &mut [S],
-    scratch: &mut SpreadScratch<S>,
+    scratch: &mut BlockScratch<S>,
 ) {
     scratch.clear(placed, TAPS);
     for first in (0..placed.count[1]).step_by(ROWS) {
@@ -261,7 +275,7 @@ fn add_slices<R: Real, S: Real, const Q: usize, const TAPS: usize>(
 /// Number of rows that are taken through all slices together: the cells that they reach stay in the first-level cache.
 const ROWS: usize = 32;
 
-impl<S: Real> SpreadScratch<S> {
+impl<S: Real> BlockScratch<S> {
     fn clear(&mut self, placed: &Placed, taps: usize) {
         self.before = LINE - 1 + taps - 1;
         self.lines = (self.before + placed.count[0]).div_ceil(LINE);
@@ -280,7 +294,7 @@ fn fade_rows<R: Real, S: Real>(
     k: usize,
     values: &BlockValues<'_, R>,
     rows: &Range<usize>,
-    scratch: &mut SpreadScratch<S>,
+    scratch: &mut BlockScratch<S>,
 ) -> Range<usize> {
     let ([width, ..], [along, across, slices]) = (placed.count, placed.steps);
     let mut live = 0;
@@ -326,7 +340,7 @@ fn add_rows<S: Real, const Q: usize, const TAPS: usize>(
     rectangle: &Rectangle,
     rows: &Range<usize>,
     live: &Range<usize>,
-    scratch: &SpreadScratch<S>,
+    scratch: &BlockScratch<S>,
     sums: &mut [S],
 ) {
     let across = by_phase::<S, Q, TAPS>(&slice.across);
@@ -355,7 +369,7 @@ fn add_rows<S: Real, const Q: usize, const TAPS: usize>(
 
 /// The weights of the voxels that reach a cell of each phase: of the voxel at the cell, of the voxel before it, ...
 #[inline(always)]
-fn by_phase<S: Real, const Q: usize, const TAPS: usize>(weights: &Spread) -> [[S; TAPS]; Q] {
+fn by_phase<S: Real, const Q: usize, const TAPS: usize>(weights: &CellWeights) -> [[S; TAPS]; Q] {
     let mut of_phases = [[S::default(); TAPS]; Q];
     for (phase, taps) in of_phases.iter_mut().enumerate() {
         taps.iter_mut().zip(weights[phase..].iter().step_by(Q)).for_each(|(tap, weight)| *tap = S::from_f64(*weight));

@@ -1,0 +1,158 @@
+//! The weights that spread a voxel to the cells around it, along one axis: those that fit its Gaussian best.
+//!
+//! Pixels gather filtered cells with the Gaussian G, so a number in the cell c counts at p as g(p - c), with the taps f of
+//! the prefilter. A voxel at x should count as G(p - x). Its weights s, one for each of the nearest `width` cells, minimize
+//!
+//! ```text
+//! integral over p of (sum over c of s_c g(p - c) - G(p - x))^2        sum of s_c g(p - c) over all c is that of G
+//! g(d) = sum over j of f_j G(d - j)                                                                       (eq 45)
+//! ```
+//!
+//! This is the projection of the Gaussian onto the shifts of g. The condition keeps constants exact. The products of
+//! Gaussians have integrals in closed form, so weights take a few equations per position.
+
+use super::prefilter::{HALF, Taps, solve, taps, total};
+
+/// The largest number of cells that a voxel is spread to along an axis.
+pub(super) const MOST_WIDTH: usize = 6;
+
+/// Weights of cells side by side; zeros beyond the width.
+pub(super) type CellWeights = [f64; MOST_WIDTH];
+
+/// The cells along an axis that a voxel is spread to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spread {
+    /// The first cell.
+    pub(super) first: isize,
+    /// The weights of this cell and of those after it.
+    pub(super) weights: CellWeights,
+}
+
+/// Spreading along one axis, for a Gaussian.
+#[derive(Debug, Clone)]
+pub(super) struct AxisFit {
+    /// Cells that a voxel is spread to.
+    pub(super) width: usize,
+    /// The prefilter.
+    pub(super) taps: Taps,
+    /// Standard deviation of the Gaussian in cells.
+    sigma: f64,
+    /// The integrals of g(p - c) g(p - d), and the weights that would give the same sum with each of the cells.
+    products: [CellWeights; MOST_WIDTH],
+    level: CellWeights,
+}
+
+impl AxisFit {
+    /// Spreading to `width` cells, for a Gaussian with a standard deviation of `sigma` cells.
+    pub(super) fn new(width: usize, sigma: f64) -> Self {
+        let taps = taps(width, sigma);
+        let of_pair = |d: f64| both(|j| both(|l| tap(&taps, j) * tap(&taps, l) * overlap(d + (j - l) as f64, sigma)));
+        let by_distance: Vec<f64> = (0..width).map(|d| of_pair(d as f64)).collect();
+        let mut products = [CellWeights::default(); MOST_WIDTH];
+        for (c, row) in products.iter_mut().enumerate() {
+            row[c] = 1.0;
+            (0..width).filter(|_| c < width).for_each(|d| row[d] = by_distance[c.abs_diff(d)]);
+        }
+        let ones = std::array::from_fn(|c| if c < width { 1.0 } else { 0.0 });
+        Self { width, taps, sigma, products, level: solve(products, ones) }
+    }
+
+    /// The cells and the weights for a voxel at `position` (eq 45).
+    pub(super) fn at(&self, position: f64) -> Spread {
+        let first = (position - self.width as f64 / 2.0).floor() as isize + 1;
+        let with_voxel = |c: usize| {
+            let d = (first + c as isize) as f64 - position;
+            both(|j| tap(&self.taps, j) * overlap(d + j as f64, self.sigma))
+        };
+        let wanted = std::array::from_fn(|c| if c < self.width { with_voxel(c) } else { 0.0 });
+        let mut weights = solve(self.products, wanted);
+        let sum = |weights: &CellWeights| weights.iter().sum::<f64>();
+        let missing = (1.0 / total(&self.taps) - sum(&weights)) / sum(&self.level);
+        weights.iter_mut().zip(self.level).for_each(|(weight, level)| *weight += missing * level);
+        Spread { first, weights }
+    }
+}
+
+/// The tap of the j-th cell on either side.
+fn tap(taps: &Taps, j: isize) -> f64 {
+    taps[j.unsigned_abs()]
+}
+
+/// The sum over all taps.
+fn both(term: impl Fn(isize) -> f64) -> f64 {
+    let half = HALF as isize;
+    (-half..=half).map(term).sum()
+}
+
+/// The integral of two Gaussians with a standard deviation of `sigma` cells, `d` cells apart, as a share of its largest
+/// value. A little of that of two narrow Gaussians is added, so that no weight is arbitrary.
+fn overlap(d: f64, sigma: f64) -> f64 {
+    let share = |sigma: f64| libm::exp(-d * d / (4.0 * sigma * sigma));
+    share(sigma) + if d.abs() < 8.0 * NARROW { LITTLE * share(NARROW) } else { 0.0 }
+}
+
+/// The narrow Gaussian's standard deviation in cells, and its weight.
+const NARROW: f64 = 0.4;
+const LITTLE: f64 = 3e-10;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_keep_constants_and_mirror() {
+        for (width, sigma) in [(4, 1.2), (4, 1.5), (5, 1.5), (5, 2.25), (6, 2.7), (6, 3.0), (6, 40.0)] {
+            let fit = AxisFit::new(width, sigma);
+            for position in [-3.75, -1.0, 0.0, 0.3, 0.5, 17.999] {
+                let Spread { first, weights } = fit.at(position);
+                let sum: f64 = weights.iter().sum();
+                assert!((sum * total(&fit.taps) - 1.0).abs() < 1e-9, "{width} {sigma} {position}");
+                let mirrored = fit.at(-position);
+                let weight = |spread: &Spread, cell: isize| {
+                    usize::try_from(cell - spread.first)
+                        .ok()
+                        .and_then(|n| spread.weights.get(n))
+                        .copied()
+                        .unwrap_or(0.0)
+                };
+                // A cell at the edge may belong to one of the two only.
+                for cell in first + 1..first + width as isize - 1 {
+                    let [one, other] = [weights[(cell - first) as usize], weight(&mirrored, -cell)];
+                    let edge = (position * 2.0).fract() == 0.0;
+                    assert!(edge || (one - other).abs() < 1e-6, "{width} {sigma} {position}: {one} {other}");
+                }
+            }
+        }
+    }
+
+    /// The sum of squares of the fitted function less the Gaussian, by sampling.
+    fn off(fit: &AxisFit, position: f64, weights: &CellWeights, first: isize) -> f64 {
+        let gaussian = |d: f64| (-0.5 * (d / fit.sigma).powi(2)).exp();
+        let at = |p: f64| {
+            let cell = |c: usize| {
+                let d = p - (first + c as isize) as f64;
+                weights[c] * both(|j| tap(&fit.taps, j) * gaussian(d - j as f64))
+            };
+            ((0..fit.width).map(cell).sum::<f64>() - gaussian(p - position)).powi(2)
+        };
+        (-400..400).map(|n| at(position + f64::from(n) * 0.05)).sum()
+    }
+
+    #[test]
+    fn no_other_weights_with_the_same_sum_fit_better() {
+        for (width, sigma) in [(4, 1.5), (5, 1.5), (5, 2.25)] {
+            let fit = AxisFit::new(width, sigma);
+            for position in [0.0, 0.2, 0.5, 0.9] {
+                let Spread { first, weights } = fit.at(position);
+                let best = off(&fit, position, &weights, first);
+                for c in 0..width - 1 {
+                    for change in [-1e-3, 1e-3] {
+                        let mut other = weights;
+                        (other[c], other[c + 1]) = (other[c] + change, other[c + 1] - change);
+                        assert!(off(&fit, position, &other, first) > best, "{width} {sigma} {position} {c}");
+                    }
+                }
+            }
+        }
+    }
+}
