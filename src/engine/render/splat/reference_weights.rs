@@ -19,7 +19,7 @@ pub(in crate::render) struct ReferenceWeights<'a> {
     tau: f64,
     /// It stands for an uncut one.
     footprint: Footprint,
-    /// Pixels from its centre to its cut.
+    /// Pixels from its centre to its cut. The footprint itself reaches a pixel at least.
     reach: f64,
     /// The rows of voxels along b.
     rows: VoxelRows,
@@ -44,20 +44,26 @@ impl<'a> ReferenceWeights<'a> {
         self.at_point(pixel.map(|n| n as f64 + 0.5))
     }
 
-    /// The sum at a point of the picture plane, over the voxels within reach, slice by slice and row by row.
+    /// The sum at a point of the picture plane. Points beyond the cut of all voxels have the sum within a pixel.
     fn at_point(&self, point: [f64; 2]) -> f64 {
+        let near = self.within(self.reach, point);
+        if near == 0.0 { self.within(self.footprint.reach, point) } else { near }
+    }
+
+    /// The sum at a point over the voxels within `reach` pixels, slice by slice and row by row.
+    fn within(&self, reach: f64, point: [f64; 2]) -> f64 {
         let [b, c, a] = self.shear.axes;
         let clip = &self.clip;
         let point = [0, 1].map(|i| point[i] - self.shear.origin[i]);
         let [_, v] = self.shear.cells(point);
-        let half = self.half(1);
+        let half = self.half(1, reach);
         let mut sum = 0.0;
         for k in clip.start[a]..clip.end[a] {
             let centre = v - self.shear.slopes[1] * k as f64;
             for i in around(centre, half, clip.start[c]..clip.end[c]) {
                 let mut voxel = [0; 3];
                 (voxel[a], voxel[c]) = (k, i);
-                sum += self.row(voxel, clip.start[b]..clip.end[b], point);
+                sum += self.row(voxel, clip.start[b]..clip.end[b], point, reach);
             }
         }
         sum
@@ -72,7 +78,7 @@ impl<'a> ReferenceWeights<'a> {
     pub(in crate::render) fn most(&self) -> f64 {
         let Shear { axes, slopes, .. } = &self.shear;
         let (tau, dims) = (self.tau, self.clip.dims());
-        let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i)) / slopes[i].abs() + 1.0;
+        let beside = |i: usize| (dims[axes[i]] as f64 + 2.0 * self.half(i, self.reach)) / slopes[i].abs() + 1.0;
         let slices = (dims[axes[2]] as f64).min(beside(0)).min(beside(1)).ceil() as usize;
         let (deeper, nearer) = (self.deeper(), self.nearer());
         let along: f64 = (0..slices).map(|n| libm::exp(-tau * (n as f64 * deeper - 2.0 * nearer).max(0.0))).sum();
@@ -114,7 +120,7 @@ impl<'a> ReferenceWeights<'a> {
 
     /// How much nearer a voxel can be than the point where the ray meets its slice, if its footprint reaches the ray.
     fn nearer(&self) -> f64 {
-        [0, 1].map(|i| self.half(i) * self.shear.depths[i].abs()).iter().sum()
+        [0, 1].map(|i| self.half(i, self.reach) * self.shear.depths[i].abs()).iter().sum()
     }
 
     fn nearest(&self) -> f64 {
@@ -126,7 +132,8 @@ impl<'a> ReferenceWeights<'a> {
     fn slice(&self) -> f64 {
         let [b, c] = self.shear.pixels;
         let dims = self.clip.dims();
-        let [most, rows] = [0, 1].map(|i| self.half(i).min(dims[self.shear.axes[i]] as f64).ceil() as isize);
+        let [most, rows] =
+            [0, 1].map(|i| self.half(i, self.reach).min(dims[self.shear.axes[i]] as f64).ceil() as isize);
         let weight = |i: isize, j: isize| {
             let [x, y] = [0, 1].map(|n| i as f64 * b[n] + j as f64 * c[n]);
             self.footprint.share([x, y])
@@ -134,16 +141,15 @@ impl<'a> ReferenceWeights<'a> {
         (-rows..=rows).flat_map(|j| (-most..=most).map(move |i| weight(i, j))).sum()
     }
 
-    /// Voxels that a footprint reaches to one side along b (0) or c (1).
-    fn half(&self, i: usize) -> f64 {
-        let reach = self.reach;
+    /// Voxels to one side along b (0) or c (1) that are within `reach` pixels.
+    fn half(&self, i: usize, reach: f64) -> f64 {
         let corners = [[reach, reach], [reach, -reach]].map(|off| self.shear.cells(off)[i].abs());
         corners[0].max(corners[1])
     }
 
     /// The sum over the voxels `all` of a row along b that starts at `voxel`.
-    fn row(&self, mut voxel: [usize; 3], all: Range<usize>, point: [f64; 2]) -> f64 {
-        let ([bx, by], reach) = (self.shear.pixels[0], self.reach);
+    fn row(&self, mut voxel: [usize; 3], all: Range<usize>, point: [f64; 2], reach: f64) -> f64 {
+        let [bx, by] = self.shear.pixels[0];
         let squared = bx * bx + by * by;
         let off = self.off(voxel, point);
         let centre = -(off[0] * bx + off[1] * by) / squared;

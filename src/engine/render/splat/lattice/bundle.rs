@@ -46,7 +46,10 @@ impl<'a> Bundles<'a> {
         let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, is_offset)).collect();
         let double = cells.double_groups.iter().filter_map(|group| of_group(cells, group, tile, |_| false)).collect();
         let mut bundles = Self { single, double };
-        let count = places(offset.len()).max(1);
+        if offset.is_empty() {
+            return bundles;
+        }
+        let count = places(offset.len());
         match ones.map(|ones| (ones_in(ones, tile), offset.chunks(count))) {
             Some((ones, chunks)) => bundles.single.extend(chunks.map(|some| without_means(some, tile, &ones))),
             None => bundles.double.extend(offset.chunks(count).map(|some| as_they_are(some, tile))),
@@ -169,8 +172,8 @@ fn side_by_side<R: Real>(
 /// Sums that are kept apart, so that additions need not wait for each other.
 const APART: usize = 4;
 
-/// The sum of cells times their weights, `N` planes side by side; the cells are `stride` apart. The order of additions is the
-/// same for any `N`, so that pixels do not depend on how many planes are together.
+/// The sum of cells times their weights, `N` planes side by side; the cells are `stride` apart. The order of additions is
+/// the same for any `N`, so that pixels do not depend on how many planes are together.
 #[inline(always)]
 pub(super) fn weighted<R: Real, const N: usize>(cells: &[[R; N]], stride: usize, weights: &[f32]) -> [R; N] {
     if N == 1 && stride == 1 {

@@ -19,18 +19,18 @@ pub(in crate::render) struct Cells {
     pub(super) rectangle: Rectangle,
     /// The sums of ordinary values in f32, plane by plane, [`TOGETHER`] planes at most in each buffer.
     pub(super) single: Vec<Zeroed<f32>>,
-    /// For each plane, the sums of values that sums in f32 cannot hold, and of the middles of blocks. A plane is the sum
-    /// of both.
+    /// For each plane, the sums in f64: all, or else those of values that sums in f32 cannot hold, and of the middles of
+    /// blocks. A plane is the sum of both.
     pub(super) planes: Vec<PlaneSums>,
     pub(super) sums: Sums,
 }
 
-/// The sums of one plane of cells that few planes have.
+/// The sums of one plane of cells.
 #[derive(Debug, Default)]
 pub(super) struct PlaneSums {
     /// Whether it has sums in f32.
     pub(super) has_single: bool,
-    /// The sums in f64, allocated with the first value.
+    /// The sums in f64; of planes in f32 allocated with the first value.
     pub(super) double: Option<Aligned<f64>>,
 }
 

@@ -1,7 +1,8 @@
 //! The weights that spread a voxel to the cells around it, along one axis: those that fit its Gaussian best.
 //!
-//! Pixels gather filtered cells with the Gaussian G, so a number in the cell c counts at p as g(p - c), with the taps f of
-//! the prefilter. A voxel at x should count as G(p - x). Its weights s, one for each of the nearest `width` cells, minimize
+//! Pixels gather filtered cells with the Gaussian G, so a number in the cell c counts at p as g(p - c), with the taps f
+//! of the prefilter. A voxel at x should count as G(p - x). Its weights s, one for each of the nearest `width` cells,
+//! minimize
 //!
 //! ```text
 //! integral over p of (sum over c of s_c g(p - c) - G(p - x))^2        sum of s_c g(p - c) over all c is that of G
@@ -37,8 +38,9 @@ pub(super) struct AxisFit {
     pub(super) taps: Taps,
     /// Standard deviation of the Gaussian in cells.
     sigma: f64,
-    /// The integrals of g(p - c) g(p - d), and the weights that would give the same sum with each of the cells.
+    /// The integrals of g(p - c) g(p - d). Rows beyond the width are those of the unit matrix.
     products: [CellWeights; MOST_WIDTH],
+    /// The change of weights that adds to their sum and spoils the fit least.
     level: CellWeights,
 }
 
@@ -48,18 +50,22 @@ impl AxisFit {
         let taps = taps(width, sigma);
         let of_pair = |d: f64| both(|j| both(|l| tap(&taps, j) * tap(&taps, l) * overlap(d + (j - l) as f64, sigma)));
         let by_distance: Vec<f64> = (0..width).map(|d| of_pair(d as f64)).collect();
-        let mut products = [CellWeights::default(); MOST_WIDTH];
-        for (c, row) in products.iter_mut().enumerate() {
-            row[c] = 1.0;
-            (0..width).filter(|_| c < width).for_each(|d| row[d] = by_distance[c.abs_diff(d)]);
-        }
+        let product = |c: usize, d: usize| {
+            if c.max(d) < width { by_distance[c.abs_diff(d)] } else { f64::from(u8::from(c == d)) }
+        };
+        let products = std::array::from_fn(|c| std::array::from_fn(|d| product(c, d)));
         let ones = std::array::from_fn(|c| if c < width { 1.0 } else { 0.0 });
         Self { width, taps, sigma, products, level: solve(products, ones) }
     }
 
+    /// The first cell that a voxel at `position` is spread to.
+    pub(super) fn first(&self, position: f64) -> isize {
+        (position - self.width as f64 / 2.0).floor() as isize + 1
+    }
+
     /// The cells and the weights for a voxel at `position` (eq 45).
     pub(super) fn at(&self, position: f64) -> Spread {
-        let first = (position - self.width as f64 / 2.0).floor() as isize + 1;
+        let first = self.first(position);
         let with_voxel = |c: usize| {
             let d = (first + c as isize) as f64 - position;
             both(|j| tap(&self.taps, j) * overlap(d + j as f64, self.sigma))

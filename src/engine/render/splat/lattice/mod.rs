@@ -11,7 +11,7 @@
 //! perpendicular to the principal axis are whole cells apart (eq 35, `shear`). So they all have the same weights, and a
 //! block costs a few products per voxel, however wide footprints are in pixels. The cost of a pixel depends only on its
 //! number of cells. Nonuniform Fourier transforms place samples on a grid in the same way: they spread by a bump and
-//! correct for it afterwards (eq 36, `prefilter`; [Greengard](wavesplat_core::bibliography)). Here the correction comes first, and the
+//! correct for it afterwards (eq 36, `prefilter`; [Greengard](wavesplat_core::bibliography)). Here the filter is chosen first, and the
 //! weights of voxels are fitted to it (eq 45, `fit`). `error` states by how much a pixel can be off.
 //!
 //! Each plane has one owner and adds blocks in file order, so sums depend neither on threads nor on memory.
@@ -46,6 +46,7 @@ pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, SpreadScratch};
 
 use fit::{AxisFit, Spread};
+use std::sync::OnceLock;
 
 /// A way to spread voxels.
 #[derive(Debug, Clone, Copy)]
@@ -90,17 +91,17 @@ struct Spreading {
     /// The weights and prefilters along u and v.
     fits: [AxisFit; 2],
     tau: f64,
-    /// For each slice of the grid, the cells along u and v of its voxel that is the first along b and c.
-    spreads: [Vec<Spread>; 2],
+    /// Slices of the grid.
+    slices: usize,
+    /// For each slice, the cells along u and v of its voxel that is the first along b and c; empty until needed.
+    spreads: OnceLock<[Vec<Spread>; 2]>,
 }
 
 impl Spreading {
     /// Spreads voxels for a Gaussian with these standard deviations in cells. The grid has `slices` slices.
     fn new(shear: Shear, choice: Choice, sigmas: [f64; 2], tau: f64, slices: usize) -> Self {
         let fits = sigmas.map(|sigma| AxisFit::new(choice.width, sigma));
-        let position = |i: usize, slice: usize| shear.fineness as f64 * shear.slopes[i] * slice as f64;
-        let spreads = [0, 1].map(|i| (0..slices).map(|slice| fits[i].at(position(i, slice))).collect());
-        Self { shear, sums: choice.sums, fits, tau, spreads }
+        Self { shear, sums: choice.sums, fits, tau, slices, spreads: OnceLock::new() }
     }
 
     /// Cells that a voxel is spread to along an axis.
@@ -110,11 +111,29 @@ impl Spreading {
 
     /// The cells along u and v that a voxel is spread to.
     fn spread(&self, voxel: [usize; 3]) -> [Spread; 2] {
-        let [b, c, a] = self.shear.axes.map(|axis| voxel[axis]);
-        let shifted = |i: usize, n: usize| {
-            let Spread { first, weights } = self.spreads[i][a];
-            Spread { first: first + (self.shear.fineness * n) as isize, weights }
-        };
-        [shifted(0, b), shifted(1, c)]
+        let slice = voxel[self.shear.axes[2]];
+        let spreads = self.spreads.get_or_init(|| {
+            [0, 1].map(|i| (0..self.slices).map(|slice| self.fits[i].at(self.position(i, slice))).collect())
+        });
+        [0, 1].map(|i| {
+            let Spread { first, weights } = spreads[i][slice];
+            Spread { first: first + self.cells_before(i, voxel), weights }
+        })
+    }
+
+    /// The first cells along u and v that a voxel is spread to.
+    fn first(&self, voxel: [usize; 3]) -> [isize; 2] {
+        let slice = voxel[self.shear.axes[2]];
+        [0, 1].map(|i| self.fits[i].first(self.position(i, slice)) + self.cells_before(i, voxel))
+    }
+
+    /// The position of a slice's first voxel along u (0) or v (1), in cells.
+    fn position(&self, i: usize, slice: usize) -> f64 {
+        self.shear.fineness as f64 * self.shear.slopes[i] * slice as f64
+    }
+
+    /// Cells along u (0) or v (1) from the first voxel of a slice to another one.
+    fn cells_before(&self, i: usize, voxel: [usize; 3]) -> isize {
+        (self.shear.fineness * voxel[self.shear.axes[i]]) as isize
     }
 }

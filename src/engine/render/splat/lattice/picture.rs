@@ -98,7 +98,10 @@ impl Lattice {
     ) -> Option<(Self, Method)> {
         let error = error.min(LARGEST);
         let radius = (2.0 * libm::log(1.0 / (CUT * error))).sqrt();
-        for choice in CHOICES.into_iter().filter(|_| error > LEAST) {
+        if error < LEAST {
+            return None;
+        }
+        for choice in CHOICES {
             let Some(lattice) = Self::new(choice, radius, view) else { continue };
             if stated(lattice.slice_error(SliceError::at_least)) > error {
                 continue;
@@ -184,7 +187,9 @@ impl Lattice {
         let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
         let (pixels, tile) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
         let copied = area(self.tile_cells(tile)) as f64 * pixels / area(tile) as f64;
-        GATHERING * self.kernel.cells() as f64 * pixels
+        let tiles = camera.size[0].div_ceil(tile[0]) * camera.size[1].div_ceil(tile[1]);
+        TILING * tiles as f64
+            + GATHERING * self.kernel.cells() as f64 * pixels
             + COPYING * copied
             + SPREADING * clip.voxels() as f64 * width * (q + 1.0)
     }
@@ -202,7 +207,7 @@ impl Lattice {
         let (mut low, mut high) = ([isize::MAX; 2], [isize::MIN; 2]);
         for corner in 0..8 {
             let at = |axis: usize| if corner >> axis & 1 == 0 { region.start[axis] } else { region.end[axis] - 1 };
-            let first = self.spreading.spread(std::array::from_fn(at)).map(|spread| spread.first);
+            let first = self.spreading.first(std::array::from_fn(at));
             (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(first[i]), high[i].max(first[i])));
         }
         // One more cell covers rounding, and cells beyond the cut that count as well.
@@ -278,7 +283,8 @@ impl Lattice {
         FilteredCells::new(cells, &self.spreading.fits.each_ref().map(|fit| fit.taps))
     }
 
-    /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. In two passes, the pixels of a row share the sums of columns, so tiles are wide.
+    /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. In two passes,
+    /// the pixels of a row share the sums of columns, so tiles are wide.
     pub(in crate::render) fn tile(&self) -> [usize; 2] {
         let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
         let side = [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
@@ -332,7 +338,7 @@ const QUICK: Choice = Choice::new(1, 4, Sums::Single);
 const QUICK_RADIUS: f64 = 3.5;
 /// The share of the error that is left for the cut of the kernel.
 const CUT: f64 = 0.03;
-/// Smaller errors are below what weights in f32 can promise.
+/// Smaller errors are below what weights in f32 can promise. Views from 5e-6 on have a lattice.
 const LEAST: f64 = 3e-6;
 /// Roundings to f32 besides the additions for a cell, 32 for the filters and 64 for a pixel; and those of a weight.
 const OTHERS: usize = 96;
@@ -340,6 +346,8 @@ const OF_A_WEIGHT: usize = 8;
 
 /// The measured cost of a footprint of a single pixel, in products.
 const FOOTPRINT: f64 = 20.0;
+/// The cost of a tile, with or without voxels, in the same unit.
+const TILING: f64 = 2000.0;
 /// The measured costs of a product from cells to pixels (weights included), of copying a cell into a tile, and of a
 /// product from voxels to cells, in units of a product of a footprint.
 const GATHERING: f64 = 0.5;

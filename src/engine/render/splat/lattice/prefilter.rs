@@ -1,8 +1,8 @@
 //! The prefilter of the cells: a short symmetric filter along each axis that undoes the blur of spreading.
 //!
 //! Pixels gather from the cells with the Gaussian itself, whose spectrum is g(k) = exp(-2 pi^2 sigma^2 k^2), with k in
-//! cycles per cell. If voxels were spread by a bump with the spectrum phi, the filter F would have to be near 1 / phi where g is
-//! large, and small where phi repeats. Its taps minimize
+//! cycles per cell. If voxels were spread by a bump with the spectrum phi, the filter F would have to be near 1 / phi
+//! where g is large, and small where phi repeats. Its taps minimize
 //!
 //! ```text
 //! integral over k of ((1 - F(k) phi(k))^2 + F(k)^2 (phi(k - 1)^2 + phi(k + 1)^2)) g(k)^2 / k^4            (eq 36)
@@ -10,8 +10,8 @@
 //! ```
 //!
 //! phi is the spectrum of the Kaiser-Bessel bump of n cells, which is nearly the best for spreading
-//! ([Barnett](wavesplat_core::bibliography)). The factor 1 / k^4 makes constants and slopes nearly exact. The weights that spread a
-//! voxel are then fitted to the filter ([`super::fit`]).
+//! ([Barnett](wavesplat_core::bibliography)). The factor 1 / k^4 makes constants and slopes nearly exact. The weights
+//! that spread a voxel are then fitted to the filter ([`super::fit`]).
 
 use std::f64::consts::PI;
 
@@ -21,8 +21,8 @@ pub(super) const HALF: usize = 7;
 /// The taps of the filter: of the cell itself, of its neighbours, of the next ones, ...
 pub(super) type Taps = [f64; HALF + 1];
 
-/// The filter for voxels spread to `width` cells that are gathered by a Gaussian with a standard deviation of `sigma` cells
-/// (eq 36).
+/// The filter for voxels spread to `width` cells that are gathered by a Gaussian with a standard deviation of `sigma`
+/// cells (eq 36).
 pub(super) fn taps(width: usize, sigma: f64) -> Taps {
     let (mut matrix, mut right) = ([[0.0; HALF + 1]; HALF + 1], Taps::default());
     for n in 0..SAMPLES {
@@ -48,7 +48,7 @@ pub(super) fn total(taps: &Taps) -> f64 {
 
 /// phi(k), and the square of its repetitions, both relative to phi(0).
 fn bump(width: usize, k: f64) -> [f64; 2] {
-    let beta = BETA[width.min(BETA.len() - 1)];
+    let beta = width as f64 * if width <= 5 { 2.2 } else { 2.6 }; // the smallest errors, by trials
     let phi = |k: f64| {
         let squared = beta * beta - (PI * width as f64 * k).powi(2);
         let r = squared.abs().sqrt();
@@ -57,9 +57,6 @@ fn bump(width: usize, k: f64) -> [f64; 2] {
     };
     [phi(k), phi(k - 1.0).powi(2) + phi(k + 1.0).powi(2)]
 }
-
-/// b for each width: those with the smallest errors, by trials.
-const BETA: [f64; 7] = [0.0, 2.2, 4.4, 6.6, 8.8, 11.0, 15.6];
 
 /// The spectra of the cell's own tap and of each pair of taps.
 fn cosines(k: f64) -> Taps {

@@ -2,8 +2,8 @@
 //!
 //! All voxels of a slice perpendicular to the principal axis have the same weights. So a row of voxels is convolved
 //! with the weights along u, once for each phase, and a row of cells is a sum of such rows times the weights along v.
-//! A block is summed by itself, then added to its plane. In f32, values that are large compared with their range are spread less
-//! their middle, and the middle by the cells of a block of ones in f64.
+//! A block is summed by itself, then added to its plane. Values that are large compared with their range are spread
+//! less their middle, and the middle by the cells of a block of ones in f64.
 
 use super::block_values::{BlockValues, fits_single};
 use super::cells::{Aligned, CellPlane, LINE, Rectangle};
@@ -239,7 +239,7 @@ fn add_block<R: Real, S: Real>(
     let (fineness, width) = (placed.spreading.shear.fineness, placed.spreading.width());
     match (fineness, width.div_ceil(fineness)) {
         (1, ..=4) => add_slices::<R, S, 1, 4>(placed, values, sums, scratch),
-        (1, _) => add_slices::<R, S, 1, 5>(placed, values, sums, scratch),
+        (1, _) => add_slices::<R, S, 1, 6>(placed, values, sums, scratch),
         (2, ..=2) => add_slices::<R, S, 2, 2>(placed, values, sums, scratch),
         (2, _) => add_slices::<R, S, 2, 3>(placed, values, sums, scratch),
         (3, _) => add_slices::<R, S, 3, 2>(placed, values, sums, scratch),
