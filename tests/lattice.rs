@@ -149,6 +149,8 @@ fn no_signs_of_samples_exceed_the_stated_error() {
         ((-50.0, 80.0), 0.0, [1.0; 3]),
         ((45.0, 35.26), 7.0, [1.0; 3]),
         ((200.0, -30.0), 90.0, [0.9, 1.0, 1.0]),
+        ((20.0, 10.0), 45.0, [1.0; 3]),
+        ((130.0, 60.0), 0.0, [1.0, 1.0, 0.9]),
     ];
     let mut attacked = 0;
     for ((azimuth, elevation), roll, spacing) in attacks {
