@@ -151,8 +151,10 @@ pub fn prefix(data: &[u8]) {
         "the same without the rest"
     );
     let metadata = found.metadata().clone();
-    let written = Writer::resume(file, found).finish();
-    assert_eq!(written.is_ok(), frames > 0);
+    let description = found.features().described.then(Description::default);
+    let written = Writer::resume(file, found).finish_described(description.as_ref());
+    let error = written.as_ref().err();
+    assert_eq!(error.is_none(), frames > 0, "{error:?}");
     if let Ok((file, summary)) = written {
         assert_eq!(summary.bytes, file.len() as u64);
         let reader = Reader::open(&file).expect("it was just finished");
