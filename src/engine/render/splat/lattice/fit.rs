@@ -5,7 +5,7 @@
 //! minimize
 //!
 //! ```text
-//! integral over p of (sum over c of s_c g(p - c) - G(p - x))^2        sum of s_c g(p - c) over all c is that of G
+//! integral over p of (sum over c of s_c g(p - c) - G(p - x))^2        with (sum of s_c) (sum of f_j) = 1
 //! g(d) = sum over j of f_j G(d - j)                                                                       (eq 45)
 //! ```
 //!
