@@ -127,7 +127,7 @@ impl Footprint {
         self.peak * libm::exp(-self.tau * z)
     }
 
-    /// Rows of voxels, each of which is a `step` in pixels and a step in depth further than the last.
+    /// Rows of voxels. From a voxel to the next one, positions change by `step` pixels and depths by `deeper`.
     pub fn rows(self, step: [f64; 2], deeper: f64) -> VoxelRows {
         VoxelRows { footprint: self, step, deeper, bend: libm::exp(-2.0 * self.decay * dot(step, step)) }
     }

@@ -115,8 +115,8 @@ struct Axis {
     amplified: f64,
 }
 
-/// Positions in a cell that are tried for a slice and for a pixel. Weights are sums of waves with periods of one cell and less. The
-/// longest waves dominate, so the largest error lies at most 1 - cos(pi / 12) above those found.
+/// Positions in a cell that are tried for a slice and for a pixel. Weights are sums of waves with periods of one cell and
+/// less. The longest waves dominate, so the largest error lies at most 1 - cos(pi / 12) above those found.
 const PHASES: usize = 12;
 /// Every so many positions give a lower bound.
 const FEW: usize = 4;

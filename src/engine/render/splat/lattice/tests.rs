@@ -146,14 +146,14 @@ fn slices_spread_like_single_values() {
 fn touched(cells: &Cells) -> Vec<(usize, Vec<f64>)> {
     let area = cells.rectangle.area();
     let single: Vec<&[f32]> = cells.single.iter().flat_map(|planes| planes.chunks_exact(area)).collect();
-    let all = |(number, sums): (usize, &super::cells::PlaneSums)| {
+    let plane = |number: usize, sums: &super::cells::PlaneSums| {
         let single = |at: usize| single.get(number).map_or(0.0, |sums| f64::from(sums[at]));
         let double = |at: usize| sums.double.as_ref().map_or(0.0, |double| double[at]);
         let all: Vec<f64> = (0..area).map(|at| single(at) + double(at)).collect();
         let is_touched = sums.has_single || cells.sums == Sums::Single && sums.double.is_some();
         (is_touched || all.iter().any(|sum| *sum != 0.0)).then_some((number, all))
     };
-    cells.planes.iter().enumerate().filter_map(all).collect()
+    cells.planes.iter().enumerate().filter_map(|(number, sums)| plane(number, sums)).collect()
 }
 
 /// Every cell of a plane and its sum.
