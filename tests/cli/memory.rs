@@ -40,7 +40,8 @@ fn archives_much_larger_than_the_budget_stay_within_it() {
     let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
     work.shell(&format!("{limit} exec {pipe} --memory {memory}MiB < big.raw")).ok();
     assert_eq!(all_but_options(&work, "file.wspl"), all_but_options(&work, "pipe.wspl")); // their --dims differ
-    let ask = work.render("file.wspl --size 96x96 --threads 2 -o v.npy --memory 1MiB").fails(2, &["--memory"]);
+    let ask =
+        work.render("file.wspl --size 96x96 --frames 0,31 --threads 2 -o v.npy --memory 1MiB").fails(2, &["--memory"]);
     let memory = memory.max(ask.mebibytes());
     let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
     let common = format!("--threads 2 --memory {memory}MiB");
@@ -50,18 +51,49 @@ fn archives_much_larger_than_the_budget_stay_within_it() {
     assert_eq!(work.read("e.raw").len(), 4 * x * y * z);
 }
 
+/// An archive of noise in 80^3 voxels and 16 frames: every code takes its place.
+fn write_noise(work: &Work, name: &str) {
+    let mut state = 1_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1 << 24) as f32
+    };
+    work.write(name, (0..80 * 80 * 80 * 16).flat_map(|_| next().to_le_bytes()).collect::<Vec<u8>>());
+}
+
+/// Renders within the planned memory, and returns the share of it that was used.
+fn used_share(work: &Work, command: &str) -> f64 {
+    let report = work.render(&format!("{command} --json")).ok().json();
+    let [planned, peak] = ["planned_bytes", "peak_bytes"].map(|key| report[key].as_u64().unwrap() as usize >> 20);
+    assert!(planned <= 512 && peak <= planned + SLACK_MIB, "{command}: {peak} of {planned}");
+    let limit = format!("ulimit -d {};", (planned + SLACK_MIB) << 10);
+    work.shell(&format!("{limit} exec $RENDER {command}")).ok();
+    peak as f64 / planned as f64
+}
+
 #[test]
 fn pictures_take_what_they_plan() {
     let work = Work::new();
     write_sparse(&work, "a.raw", [128, 128, 128, 32]);
     work.wavesplat("convert a.raw --dims 128x128x128x32 --dtype f32 --level 1 -o a.wspl").ok();
-    for tolerance in ["", "--tolerance 0.1", "--frames 3,4,9"] {
-        let command = format!("a.wspl --threads 2 -o v.npy --force {tolerance}");
-        let report = work.render(&format!("{command} --json")).ok().json();
-        let planned = report["planned_bytes"].as_u64().unwrap() as usize >> 20;
-        assert!(planned <= 512);
-        let limit = format!("ulimit -d {};", (planned + SLACK_MIB) << 10);
-        work.shell(&format!("{limit} exec $RENDER {command}")).ok();
+    for options in ["", "--tolerance 0.1", "--frames 3,4,9", "--error-image e.npy"] {
+        used_share(&work, &format!("a.wspl --threads 2 -o v.npy --force {options}"));
+    }
+    write_noise(&work, "n.raw");
+    work.wavesplat("convert n.raw --dims 80x80x80x16 --dtype f32 --level 1 -o n.wspl").ok();
+    // A plan is an upper bound for any data, and takes all blocks as large as the largest. That of footprints counts vectors
+    // that grow.
+    for (options, least) in [
+        ("", 0.5),
+        ("--splat-error 1e-5", 0.6),
+        ("--splat-error 0", 0.2),
+        ("--mode composite", 0.8),
+        ("--mode mip", 0.8),
+        ("--mode iso --iso 0.5", 0.8),
+        ("--mode slice --slice z=0.5", 0.6),
+    ] {
+        let share = used_share(&work, &format!("n.wspl --threads 2 -o v.npy --force {options}"));
+        assert!(share >= least, "{options}: {share}");
     }
 }
 

@@ -47,7 +47,7 @@ impl Scene for FormulaScene {
     }
 
     /// As of a decoded block: coefficients in f32 and values in f64.
-    fn block_bytes(&self) -> usize {
+    fn block_bytes(&self, _frames: usize, _config: &RenderConfig) -> usize {
         self.blocks().region(0).voxels() * self.frames * (size_of::<f32>() + size_of::<f64>())
     }
 

@@ -167,6 +167,12 @@ pub struct BlockGrid {
     pub edges: [usize; 3],
 }
 
+/// The bits of three numbers in turns, up to 21 of each.
+fn interleaved(numbers: [usize; 3]) -> u64 {
+    let bits = (0..21).flat_map(|bit| (0..3).map(move |a| (bit, a)));
+    bits.fold(0, |all, (bit, a)| all | (numbers[a] as u64 >> bit & 1) << (3 * bit + a))
+}
+
 impl BlockGrid {
     /// A volume cut into cubes of `edge` voxels a side.
     pub fn cubes(dims: [usize; 3], edge: usize) -> Self {
@@ -196,6 +202,12 @@ impl BlockGrid {
             start: std::array::from_fn(|a| at[a] * self.edges[a]),
             end: std::array::from_fn(|a| ((at[a] + 1) * self.edges[a]).min(self.dims[a])),
         }
+    }
+
+    /// Sorts blocks so that those of each 2 x 2 x 2, 4 x 4 x 4, ... follow each other.
+    pub fn sort_nested(&self, blocks: &mut [usize]) {
+        let [cx, cy, _] = self.counts();
+        blocks.sort_by_cached_key(|block| interleaved([block % cx, block / cx % cy, block / (cx * cy)]));
     }
 
     /// The numbers of the blocks that touch `region`, ascending.
@@ -246,6 +258,18 @@ mod tests {
         for (i, v) in region.iter().enumerate() {
             assert_eq!((region.index(v), region.voxel(i)), (i, v));
         }
+    }
+
+    #[test]
+    fn blocks_in_nested_order_stay_near_each_other() {
+        let grid = BlockGrid::cubes([5, 3, 2], 1);
+        let mut blocks: Vec<usize> = (0..grid.len()).collect();
+        grid.sort_nested(&mut blocks);
+        let places: Vec<[usize; 3]> = blocks.iter().map(|b| grid.region(*b).start).collect();
+        assert_eq!(places[..8].iter().flatten().max(), Some(&1));
+        assert_eq!(places[8], [2, 0, 0]);
+        blocks.sort_unstable();
+        assert!(blocks.into_iter().eq(0..grid.len()));
     }
 
     #[test]

@@ -11,5 +11,16 @@ pub fn least(needs: impl Fn(usize) -> usize) -> usize {
     (0..32).fold(0, |budget, _| needs(budget))
 }
 
+/// About the most memory that this process has used so far, in bytes, without the files that it maps now. Linux alone tells
+/// it.
+pub fn peak() -> Option<usize> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let bytes = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        line.split_whitespace().nth(1)?.parse::<usize>().ok().map(|kib| kib << 10)
+    };
+    Some(bytes("VmHWM")?.saturating_sub(bytes("RssFile")?).max(bytes("RssAnon")?))
+}
+
 /// Largest number of blocks in work at a time: enough to keep all threads busy. More would only delay the first result.
 pub const MOST_BLOCKS: usize = 64;

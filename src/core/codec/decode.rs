@@ -314,7 +314,17 @@ impl Block {
     /// at a time.
     /// Outliers and missing samples are not yet in place.
     pub fn for_each_run(&self, codec: &WindowCodec, wanted: &WantedFrames, visit: impl FnMut(usize, &[f64])) {
-        let field = self.field_of(codec, wanted);
+        self.for_each_run_of(codec, &self.field_of(codec, wanted), wanted, visit);
+    }
+
+    /// As [`Self::for_each_run`], for a block whose coefficients are decoded already.
+    pub fn for_each_run_of(
+        &self,
+        codec: &WindowCodec,
+        field: &Field<'_>,
+        wanted: &WantedFrames,
+        visit: impl FnMut(usize, &[f64]),
+    ) {
         if codec.scheme.basis == Basis::Samples {
             field.for_each_run_of_samples(self.voxels, &wanted.frames, visit);
         } else {

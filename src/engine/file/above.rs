@@ -22,8 +22,8 @@ pub(crate) struct AboveBlocks {
     leaves: Mutex<VecDeque<(BlockId, Arc<Vec<BlockEntry>>)>>,
 }
 
-/// Leaves that stay in memory: usually enough for one in every tier.
-const LEAVES: usize = 8;
+/// Leaves that stay in memory: usually enough for one in every tier, and for blocks in nested order.
+const LEAVES: usize = 16;
 
 /// What is decoded of a block.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -112,11 +112,12 @@ impl AboveBlocks {
     }
 
     /// The place of a decoded block, which becomes the most recently used one: the place in the list, else `decoded`, else a new one.
-    /// The least recently used blocks make room.
+    /// The least recently used blocks make room, and what else was decoded of the same block.
     fn slot(&self, key: &AboveKey, decoded: Option<&Slot>) -> Slot {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let known = kept.iter().position(|(of, _)| of == key).map(|at| kept.remove(at).1);
         let slot = known.or_else(|| decoded.cloned()).unwrap_or_default();
+        kept.retain(|(of, _)| of.id != key.id);
         kept.push((key.clone(), slot.clone()));
         let old = kept.len().saturating_sub(self.most());
         kept.drain(..old);
@@ -172,6 +173,20 @@ pub(super) fn bytes_above(m: &Metadata) -> usize {
     let bytes = |window: &Window| window.coefficients as usize * window.coefficient_size();
     let tiered = m.windows.iter().filter(|window| window.tiers() > 0);
     nodes_above(detail::whole(m).1) * tiered.map(bytes).max().unwrap_or(0)
+}
+
+/// An upper bound of the bytes of the decoded nodes of all blocks above others in a file.
+pub(super) fn bytes_of_all_above(m: &Metadata) -> usize {
+    let nodes = |tier: u8| {
+        // Each block has at most one ghost node, and one node more than its share.
+        let along = |axis: usize| (m.dims[axis].div_ceil(1 << tier) + 2 * m.blocks_per_axis(tier)[axis]) as f64;
+        (0..3).map(along).product::<f64>()
+    };
+    let of_window = |window: &Window| {
+        let tiers = (1..=window.tiers()).map(nodes).sum::<f64>();
+        tiers * f64::from(window.coefficients) * window.coefficient_size() as f64
+    };
+    (m.windows.iter().map(of_window).sum::<f64>() * f64::from(m.channels)) as usize
 }
 
 /// The most nodes of a block above these, ghost nodes included.

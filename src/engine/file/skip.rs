@@ -65,6 +65,11 @@ impl CoefficientFile {
         Ok(found)
     }
 
+    /// Whether blocks are skipped.
+    pub(crate) fn skips_damage(&self) -> bool {
+        self.skipped().is_some()
+    }
+
     /// What [`Self::skip_damaged`] found.
     pub(super) fn skipped(&self) -> Option<&Damage> {
         self.skipped.as_deref().filter(|damage| !damage.is_empty())

@@ -1,6 +1,8 @@
 //! Blocks of files with tiers: they begin with the decoded nodes of the block above.
 
-use super::above::{AboveKey, PlaceAbove, bytes_above, most_within, nodes_above, with_blocks_above};
+use super::above::{
+    AboveKey, PlaceAbove, bytes_above, bytes_of_all_above, most_within, nodes_above, with_blocks_above,
+};
 use super::coefficient_file::CoefficientFile;
 use super::detail;
 use rayon::prelude::*;
@@ -12,7 +14,7 @@ use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::{Above, Field};
 use wavesplat_format::limits::BLOCKS_PER_LEAF;
-use wavesplat_format::{Axis, BlockEntry, BlockId};
+use wavesplat_format::{Axis, BlockEntry, BlockId, LeafEntry, Window};
 
 impl CoefficientFile {
     /// The nodes of the block above with which a block begins at the codec's level of detail. None without tiers above.
@@ -83,8 +85,13 @@ impl CoefficientFile {
         let Some(leaf) = self.reader.leaves_of(id.window, id.tier, id.channel).get(leaf) else {
             return Err(self.contradiction(format!("no {id}")));
         };
-        let entries = self.above.leaf(leaf.first(), || self.leaf(leaf))?;
+        let entries = self.kept_leaf(leaf)?;
         entries.get(number).cloned().ok_or_else(|| self.contradiction(format!("no {id}")))
+    }
+
+    /// The entries of a leaf, which stay in memory for a while.
+    pub(crate) fn kept_leaf(&self, leaf: &LeafEntry) -> Result<Arc<Vec<BlockEntry>>> {
+        self.above.leaf(leaf.first(), || self.leaf(leaf))
     }
 
     /// Keeps decoded blocks above others within their share of a memory budget, for this file and its clones. At first, the
@@ -96,23 +103,45 @@ impl CoefficientFile {
     /// Bytes of the decoded blocks above others within their share of a memory budget.
     pub fn shared_bytes(&self, memory: usize) -> usize {
         let each = bytes_above(self.metadata());
-        most_within(memory, each) * each
+        (most_within(memory, each) * each).min(bytes_of_all_above(self.metadata()))
     }
 
     /// Extra bytes to decode a block in a file with tiers: its known nodes, and the block above while that is decoded, with `each`
     /// bytes for a coefficient.
     pub(crate) fn bytes_to_begin(&self, each: usize) -> usize {
-        let m = self.metadata();
-        let longest = m.windows.iter().map(|window| window.coefficients as usize).max().unwrap_or(0);
-        let (own, above) = (self.largest_block(), nodes_above(detail::whole(m).1) * longest);
-        let known = if self.lod > 0 {
-            own
-        } else {
-            self.blocks.region(0).dims().iter().map(|n| n / 2 + 1).product::<usize>() * longest
-        };
         // The block above is decoded before its nodes are copied.
-        let bytes = known * size_of::<f64>() + above.saturating_sub(own) * each;
-        if bytes_above(m) > 0 { bytes } else { 0 }
+        self.known_bytes() + self.largest_block_above().saturating_sub(self.largest_block()) * each
+    }
+
+    /// Bytes of the known nodes of a block.
+    pub(crate) fn known_bytes(&self) -> usize {
+        let known = if self.lod > 0 {
+            self.largest_block()
+        } else {
+            self.blocks.region(0).dims().iter().map(|n| n / 2 + 1).product::<usize>() * self.most_coefficients()
+        };
+        if bytes_above(self.metadata()) > 0 { known * self.coefficient_size() } else { 0 }
+    }
+
+    /// The coefficients of the largest block above others; 0 without tiers.
+    pub(crate) fn largest_block_above(&self) -> usize {
+        let m = self.metadata();
+        if bytes_above(m) > 0 { nodes_above(detail::whole(m).1) * self.most_coefficients() } else { 0 }
+    }
+
+    /// The codes of the largest block, ghost nodes included, whatever the level of detail.
+    pub(crate) fn most_codes(&self) -> usize {
+        nodes_above(detail::whole(self.metadata()).1) * self.most_coefficients()
+    }
+
+    /// The most coefficients of a voxel.
+    pub(crate) fn most_coefficients(&self) -> usize {
+        self.metadata().windows.iter().map(|window| window.coefficients as usize).max().unwrap_or(0)
+    }
+
+    /// Bytes of a decoded coefficient.
+    pub(crate) fn coefficient_size(&self) -> usize {
+        self.metadata().windows.iter().map(Window::coefficient_size).max().unwrap_or(0)
     }
 
     /// An upper bound of the coefficients that blocks of tier 0 begin with.

@@ -23,7 +23,7 @@
 //! scenes/           a coefficient file or an archive's frames as a scene
 //! planes/           planes through the volume: where rays meet them, and the samples there
 //! slices/           composites, isosurfaces and maximum intensity projections: the field along rays, slice by slice
-//! projection/       projections: weights, memory, bands of rows, planes to pixels; sums of a part of the voxels
+//! projection/       projections: weights, memory, bands, planes to pixels; sums of a part of the voxels
 //! annotate/, sink/  text in pictures, and output files, with page/ for web pages; pictures: a rendering into files
 //! partial/          files of partial sums, and pictures of their totals
 //! ```

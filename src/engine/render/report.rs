@@ -59,7 +59,7 @@ pub struct RenderReport {
     pub certified_error: Option<f64>,
     /// Stored bytes of blocks that were read, without those of the tiers above them.
     pub bytes_read: u64,
-    /// The largest number of bytes that a projection planned to use, of [`RenderConfig::memory`](super::RenderConfig).
+    /// The largest number of bytes that a view planned to use, of [`RenderConfig::memory`](super::RenderConfig).
     pub planned_bytes: u64,
     /// Nonzero coefficients splatted; repeated splatting counts again.
     pub coefficients: u64,

@@ -23,6 +23,7 @@ use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::inputs::spare_inputs;
+use wavesplat_core::base::memory;
 use wavesplat_core::base::output::Output;
 use wavesplat_engine::file::shard::ShardPlace;
 use wavesplat_engine::file::{CoefficientFile, setting};
@@ -287,7 +288,8 @@ impl Sum<'_> {
     }
 
     fn report(&self, report: &RenderReport, picture: &Provenance, coloured: ColouredPictures) -> Result<String> {
-        let pictures = &Reported { report, picture, coloured, file_bytes_read: None, file_bytes: None };
+        let peak_bytes = memory::peak();
+        let pictures = &Reported { report, picture, coloured, peak_bytes, file_bytes_read: None, file_bytes: None };
         written(self.request, &SumReport { pictures, summed: Summed::new(self.total) })
     }
 

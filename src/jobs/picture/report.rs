@@ -22,6 +22,8 @@ pub(super) struct Reported<'a> {
     pub(super) coloured: ColouredPictures,
     /// The settings stored in every picture; `views` has those of each view.
     pub(super) picture: &'a Provenance,
+    /// The most memory that the process used so far, in bytes, to compare with `planned_bytes`.
+    pub(super) peak_bytes: Option<usize>,
     /// Bytes read of the coefficient file, including its directory, and its size.
     pub(super) file_bytes_read: Option<u64>,
     pub(super) file_bytes: Option<u64>,

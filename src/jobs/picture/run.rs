@@ -9,6 +9,7 @@ use super::request::PictureRequest;
 use super::series::write_series;
 use super::session::Session;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::memory;
 use wavesplat_engine::render::render;
 
 /// Writes what a request asks for.
@@ -43,7 +44,8 @@ fn write_pictures(session: &Session, request: &PictureRequest, reporter: &dyn Re
         reporter.detail_read(read, bytes);
     }
     let coloured = plan.colouring.coloured();
-    let reported = Reported { report: &report, picture: &plan.provenance, coloured, file_bytes_read, file_bytes };
+    let (report, picture, peak_bytes) = (&report, &plan.provenance, memory::peak());
+    let reported = Reported { report, picture, coloured, peak_bytes, file_bytes_read, file_bytes };
     Ok(Outcome {
         report: written(request, &reported)?,
         is_on_stdout: request.writes_to_stdout(),

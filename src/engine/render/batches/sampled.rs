@@ -5,6 +5,7 @@ use super::samples::SampleReader;
 use super::scene::{FrameBatch, Scene};
 use crate::render::config::RenderConfig;
 use crate::render::report::RenderReport;
+use std::cell::Cell;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::memory;
 use wavesplat_core::base::progress::Progress;
@@ -34,13 +35,20 @@ impl SampledView<'_> {
         mut give: impl FnMut(&[usize], &[f32]) -> Result<()>,
     ) -> Result<()> {
         let (blocks, at_a_time) = (scene.blocks(), self.blocks_at_a_time(scene));
-        let fits = |scene: &dyn Scene, frames: usize| self.bytes(scene, frames, at_a_time) <= self.config.memory;
-        let together = |scene: &dyn Scene, most: usize| (1..=most).rev().find(|n| fits(scene, *n)).unwrap_or(1);
+        let planned = Cell::new(0);
+        let together = |scene: &dyn Scene, most: usize| {
+            let bytes = |frames: usize| self.bytes(scene, frames, at_a_time);
+            let together = (1..=most).rev().find(|n| bytes(*n) <= self.config.memory).unwrap_or(1);
+            planned.set(planned.get().max(bytes(together)));
+            together
+        };
         let job = Job { config: self.config, together: &together, views: &[] };
         let render = |batch: &dyn FrameBatch, report: &mut RenderReport| {
             render(&SampleReader { batch, blocks, at_a_time, progress }, report)
         };
-        for_each_batch(scene, job, report, render, |frames, channels, _| give(frames, &channels[0].pictures))
+        for_each_batch(scene, job, report, render, |frames, channels, _| give(frames, &channels[0].pictures))?;
+        report.planned_bytes = report.planned_bytes.max(planned.get() as u64);
+        Ok(())
     }
 
     fn blocks_at_a_time(&self, scene: &dyn Scene) -> usize {
@@ -65,5 +73,5 @@ fn block_bytes(scene: &dyn Scene, config: &RenderConfig, frames: usize) -> usize
     let voxels = scene.blocks().region(0).voxels();
     let coefficients = scene.most_planes(frames, config).saturating_sub(2 * frames + 1);
     let inverted = if coefficients > 0 { (coefficients + 2 * frames) * size_of::<f64>() } else { 0 };
-    scene.block_bytes() + voxels * (frames * size_of::<f32>() + 2 * size_of::<f64>() + inverted)
+    scene.block_bytes(frames, config) + voxels * (frames * size_of::<f32>() + 2 * size_of::<f64>() + inverted)
 }

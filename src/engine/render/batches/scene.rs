@@ -52,8 +52,8 @@ pub trait Scene {
     /// An upper bound of the number of planes for a batch of `frames` frames.
     fn most_planes(&self, frames: usize, config: &RenderConfig) -> usize;
 
-    /// An upper bound of the memory of one decoded block, in bytes.
-    fn block_bytes(&self) -> usize;
+    /// An upper bound of the memory of one decoded block for a batch of `frames` frames, in bytes.
+    fn block_bytes(&self, frames: usize, config: &RenderConfig) -> usize;
 
     /// Bytes that all blocks share, within a memory budget.
     fn shared_bytes(&self, _memory: usize) -> usize {

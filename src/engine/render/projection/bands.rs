@@ -1,10 +1,11 @@
-//! Splats a batch into the pictures of some views, as many rows at a time as fit in memory. A band that needs more sums in
-//! f64 than have room is splatted again, with fewer rows.
+//! Splats a batch into the pictures of some views, as many pixels at a time as fit in memory. A band that needs more sums
+//! in f64 than have room is splatted again, with fewer pixels.
 
 use super::plan::Budget;
 use super::weight_sums::WeightSums;
 use crate::render::batches::{BlockReader, FrameBatch};
 use crate::render::report::{RenderReport, lap};
+use crate::render::splat::tile_rect::TileRect;
 use crate::render::splat::{BandAccumulator, Pixels, ResolvedTile, splat};
 use std::ops::DerefMut;
 use std::time::Instant;
@@ -33,22 +34,24 @@ impl ViewGroup<'_> {
     ) -> Result<()> {
         let (layout, budget) = (batch.layout(), self.budget);
         let blocks = self.visible_blocks(batch, report);
-        let (mut start, end) = (0, budget.size()[1]);
-        while start < end {
-            let plan = budget.band(&layout, start);
+        let mut left = vec![TileRect::whole(budget.size())];
+        while let Some(rect) = left.pop() {
+            left.extend(budget.split(&layout, &rect).into_iter().rev());
+            let Some(rect) = left.pop() else { break };
+            let plan = budget.plan(&layout, rect);
             let mut bands: Vec<_> = self
                 .weights
                 .iter()
-                .map(|view| BandAccumulator::new(view.setup, plan.rows.clone(), &layout).relative_to(view.ones()))
+                .map(|view| BandAccumulator::new(view.setup, plan.rect.clone(), &layout).relative_to(view.ones()))
                 .collect();
             let reader = BlockReader { source: &batch, at_a_time: plan.blocks, progress: self.progress };
             report.add_read(&splat(&mut bands, &blocks, &reader, &plan.room)?);
             report.planned_bytes = report.planned_bytes.max(budget.granted_bytes(&layout, &plan) as u64);
             budget.learn(&plan);
             if plan.room.is_exceeded() {
-                continue; // with more room: fewer rows, or fewer blocks at a time
+                left.push(plan.rect); // with more room: fewer pixels, or fewer blocks at a time
+                continue;
             }
-            start = plan.rows.end;
             let mut clock = Instant::now();
             for (view, (band, pictures)) in bands.into_iter().zip(&mut *pictures).enumerate() {
                 band.finish(pictures, |tile, rows| finish(view, tile, rows));
@@ -60,12 +63,14 @@ impl ViewGroup<'_> {
 
     /// The selected blocks that reach a pixel of any view. Counts the others in the report.
     fn visible_blocks(&self, batch: &dyn FrameBatch, report: &mut RenderReport) -> Vec<usize> {
-        let all_rows = 0..self.budget.size()[1];
+        let whole = TileRect::whole(self.budget.size());
         let mut blocks = batch.selection().blocks.clone();
         let selected = blocks.len();
-        blocks.retain(|b| self.weights.iter().any(|view| view.setup.reaches(*b, &all_rows)));
+        blocks.retain(|b| self.weights.iter().any(|view| view.setup.reaches(*b, &whole)));
         let reached = blocks.len();
-        blocks.retain(|b| self.weights.iter().any(|view| view.setup.sees(*b, &all_rows)));
+        // Those that share blocks above follow each other.
+        self.weights[0].setup.blocks.sort_nested(&mut blocks);
+        blocks.retain(|b| self.weights.iter().any(|view| view.setup.sees(*b)));
         report.blocks_outside += (selected - reached) as u64;
         report.blocks_dimmed += (reached - blocks.len()) as u64;
         blocks

@@ -6,7 +6,7 @@
 //! plan             how much fits in memory
 //! splat_weights    the weights of a view
 //! reconstruct      planes to pixels: inverse transform, division, certificate
-//! bands            rows of all pictures of a batch
+//! bands            parts of all pictures of a batch
 //! partial_sums     the contribution of some of the voxels to pictures
 //! ```
 
@@ -94,6 +94,7 @@ fn render_views(
     let group = ViewGroup { weights, budget, progress: *progress };
     let expectations: Vec<_> =
         group.weights.iter().map(|weights| Expectation::new(weights.view(), config.quantity)).collect();
+    report.planned_bytes = report.planned_bytes.max(budget.planned_for_ones() as u64);
     lap(&mut clock, &mut report.weight_seconds);
     let together = |scene: &dyn Scene, most: usize| budget.frames(scene, config, most);
     let job = Job { config, together: &together, views: &expectations };

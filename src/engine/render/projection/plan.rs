@@ -1,15 +1,14 @@
 //! Divides the work so that memory stays within its budget.
 //!
-//! The number of views and frames rendered together, the rows of a band and the blocks decoded together do not change
+//! The number of views and frames rendered together, the pixels of a band and the blocks decoded together do not change
 //! any pixel.
 
 use crate::render::batches::{Layout, Scene, in_batch};
 use crate::render::config::RenderConfig;
 use crate::render::splat::footprints::Splats;
 use crate::render::splat::sparse_terms::SparseTerms;
-use crate::render::splat::tile_rect::TILE;
+use crate::render::splat::tile_rect::{TILE, TileRect, WIDEST};
 use crate::render::splat::{DoubleRoom, ViewSetup};
-use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::memory;
@@ -41,10 +40,10 @@ struct Planes {
     doubles: usize,
 }
 
-/// A band of rows to splat, the blocks to decode at a time, and the room for sums in f64.
+/// A band to splat, the blocks to decode at a time, and the room for sums in f64.
 #[derive(Debug)]
 pub(super) struct BandPlan {
-    pub(super) rows: Range<usize>,
+    pub(super) rect: TileRect,
     pub(super) blocks: usize,
     pub(super) room: DoubleRoom,
 }
@@ -69,8 +68,10 @@ impl Kept {
     }
 }
 
-/// The sums of weights for every pixel: as splatted, uncut, and beyond the cut.
-const WEIGHT_BYTES: usize = 3 * size_of::<f64>();
+/// The sums of weights for every pixel: as splatted, and uncut.
+const WEIGHT_BYTES: usize = 2 * size_of::<f64>();
+/// The weights of a pixel beyond the cut, if pictures are certified.
+const BEYOND_BYTES: usize = size_of::<f64>();
 
 impl<'a> Budget<'a> {
     /// The least memory in bytes with which each view can be rendered alone.
@@ -79,7 +80,8 @@ impl<'a> Budget<'a> {
         let least = |setup: &ViewSetup| {
             let setups = std::slice::from_ref(setup);
             let budget = Budget::new(config, kept, scene, setups);
-            let alone = fixed(config, setups) + budget.bytes(1, budget.all_double(planes), TILE, 1);
+            let bands = budget.bytes(1, budget.all_double(planes), budget.smallest(), 1);
+            let alone = fixed(config, setups) + bands.max(budget.ones_bytes());
             memory::least(|memory| alone + scene.shared_bytes(memory))
         };
         setups.iter().map(least).max().unwrap_or(0)
@@ -91,7 +93,8 @@ impl<'a> Budget<'a> {
         let (size, pixel_bytes) = (config.size(), setups.len() * of_a_view);
         let fixed = fixed(config, setups) + scene.shared_bytes(config.memory);
         let available = config.memory.saturating_sub(fixed);
-        let (block, block_bytes) = (scene.blocks().region(0), scene.block_bytes());
+        let block_bytes = scene.block_bytes(most_frames(scene, &config.frames), config);
+        let block = scene.blocks().region(0);
         let doubles = AtomicUsize::new(0);
         Self { setups, fixed, available, size, pixel_bytes, together, block, block_bytes, doubles }
     }
@@ -104,10 +107,10 @@ impl<'a> Budget<'a> {
         scene: &dyn Scene,
         setups: &'a [ViewSetup],
     ) -> Self {
-        let (rows, alone) = (config.size()[1], Self::new(config, kept, scene, &setups[..1]));
+        let (size, alone) = (config.size(), Self::new(config, kept, scene, &setups[..1]));
         let frames = alone.frames(scene, config, most_frames(scene, &config.frames));
         let planes = scene.most_planes(frames, config);
-        let fits = |budget: &Self| budget.fits(frames, budget.planes(planes), rows);
+        let fits = |budget: &Self| budget.fits(frames, budget.planes(planes), size);
         let several = |count: usize| Some(Self::new(config, kept, scene, &setups[..count])).filter(fits);
         let (mut best, mut least) = (alone, 1);
         let mut most = if config.chooses_by_view() { 1 } else { setups.len() };
@@ -146,16 +149,35 @@ impl<'a> Budget<'a> {
         Planes { all, doubles: all * self.setups.len() }
     }
 
-    /// Bytes of the pictures of `frames` frames, bands of `rows` rows, and some blocks.
-    fn bytes(&self, frames: usize, planes: Planes, rows: usize, blocks: usize) -> usize {
-        self.picture_bytes(frames) + self.band_bytes(planes, rows) + blocks * self.block_bytes(planes.all)
+    /// Bytes of the pictures of `frames` frames, bands of `size` pixels, and some blocks.
+    fn bytes(&self, frames: usize, planes: Planes, size: [usize; 2], blocks: usize) -> usize {
+        self.picture_bytes(frames) + self.band_bytes(planes, size) + blocks * self.block_bytes(planes.all)
     }
 
-    /// Whether [`Self::bytes`] fit with one block; and also the lowest band, should all planes need sums in f64.
-    fn fits(&self, frames: usize, planes: Planes, rows: usize) -> bool {
-        let (bytes, lowest) =
-            (self.bytes(frames, planes, rows, 1), self.bytes(frames, self.all_double(planes.all), TILE, 1));
-        bytes.max(lowest) <= self.available
+    /// Whether [`Self::bytes`] fit with one block; and also the smallest band, should all planes need sums in f64.
+    fn fits(&self, frames: usize, planes: Planes, size: [usize; 2]) -> bool {
+        let all_double = self.bytes(frames, self.all_double(planes.all), self.smallest(), 1);
+        self.bytes(frames, planes, size, 1).max(all_double) <= self.available
+    }
+
+    /// Bytes to splat ones, in addition to those that are kept of them.
+    fn ones_bytes(&self) -> usize {
+        let of_view = |setup: &ViewSetup| {
+            let (backend, threads) = (&setup.backend, rayon::current_num_threads());
+            let numbers = threads * (backend.scratch(&self.block, 1) + backend.kept(&self.block) + self.block.voxels());
+            backend.bytes_while_ones(self.size) + numbers * size_of::<f64>()
+        };
+        self.setups.iter().map(of_view).max().unwrap_or(0)
+    }
+
+    /// Bytes that splatting ones takes, with all that does not depend on bands.
+    pub(super) fn planned_for_ones(&self) -> usize {
+        self.fixed + self.ones_bytes()
+    }
+
+    /// The size of the smallest band.
+    fn smallest(&self) -> [usize; 2] {
+        [self.size[0].min(WIDEST), self.size[1].min(TILE)]
     }
 
     /// Bytes of a block, with its sparse terms and their projections in each view that takes footprints, and its cells of
@@ -172,48 +194,65 @@ impl<'a> Budget<'a> {
         (frames * self.pixel_bytes + self.together) * self.pixels()
     }
 
-    /// Bytes of bands of `rows` rows, and of the scratch of all threads.
-    fn band_bytes(&self, planes: Planes, rows: usize) -> usize {
+    /// Bytes of bands of `size` pixels, and of the scratch of all threads.
+    fn band_bytes(&self, planes: Planes, size: [usize; 2]) -> usize {
         let of_views = |bytes: &dyn Fn(&ViewSetup) -> usize| self.setups.iter().map(bytes).sum::<usize>();
-        let bands = of_views(&|setup| setup.backend.band_bytes(self.size[0], rows, planes.all));
+        let bands = of_views(&|setup| setup.backend.band_bytes(size, planes.all));
         let scratch = self.setups.iter().map(|setup| setup.backend.scratch(&self.block, planes.all)).max().unwrap_or(0);
         let threads = rayon::current_num_threads();
         // A thread may begin a plane in f64 in each view before it sees that there is no room; and it filters one.
         let more = threads * self.setups.len();
-        bands + (planes.doubles + more) * self.double_bytes(rows) + threads * scratch * size_of::<f64>()
+        let doubles = planes.doubles * self.double_bytes(size) + more * self.begun_bytes(size);
+        bands + doubles + threads * scratch * size_of::<f64>()
     }
 
-    /// Bytes of a plane in f64 of a band of `rows` rows, in the view where it takes most.
-    fn double_bytes(&self, rows: usize) -> usize {
-        self.setups.iter().map(|setup| setup.backend.double_bytes(self.size[0], rows)).max().unwrap_or(0)
+    /// Bytes of a plane in f64 of a band of `size` pixels, in the view where it takes most.
+    fn begun_bytes(&self, size: [usize; 2]) -> usize {
+        self.setups.iter().map(|setup| setup.backend.double_bytes(size)).max().unwrap_or(0)
+    }
+
+    /// The same, with what all threads copy of it to gather tiles.
+    fn double_bytes(&self, size: [usize; 2]) -> usize {
+        let copied = self.setups.iter().map(|setup| setup.backend.copied_bytes()).max().unwrap_or(0);
+        self.begun_bytes(size) + rayon::current_num_threads() * copied
     }
 
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
-        let rows = self.size[1].min(FEW_ROWS * TILE);
-        let fits = |f: &usize| self.fits(*f, self.planes(scene.most_planes(*f, config)), rows);
+        let size = self.size.map(|n| n.min(PREFERRED));
+        let fits = |f: &usize| self.fits(*f, self.planes(scene.most_planes(*f, config)), size);
         (1..=most).rev().find(fits).unwrap_or(1)
     }
 
-    /// The next band of rows to splat: splits the rows from `start` on into as few bands as fit, of nearly equal height.
-    pub(super) fn band(&self, layout: &Layout, start: usize) -> BandPlan {
-        let left = self.size[1] - start;
-        let rows = |tiles: usize| (tiles * TILE).min(left);
-        let fits = |tiles: &usize| self.fits(layout.frames, self.planes(layout.planes()), rows(*tiles));
-        let most = rows((1..=left.div_ceil(TILE)).rev().find(fits).unwrap_or(1));
-        let rows = rows(left.div_ceil(left.div_ceil(most)).div_ceil(TILE));
-        self.plan(layout, start..start + rows)
+    /// Splits some pixels into as few bands as fit, of nearly equal size. Bands begin at the first pixel of a tile.
+    pub(super) fn split(&self, layout: &Layout, rect: &TileRect) -> Vec<TileRect> {
+        let planes = self.planes(layout.planes());
+        let [columns, rows] = [rect.x.len().div_ceil(WIDEST), rect.y.len().div_ceil(TILE)];
+        let size = |across: usize, down: usize| {
+            [rect.x.len().min(columns.div_ceil(across) * WIDEST), rect.y.len().min(rows.div_ceil(down) * TILE)]
+        };
+        let fewest = |across: usize| {
+            let down = (1..=rows).find(|down| self.fits(layout.frames, planes, size(across, *down)))?;
+            Some((across * down, size(across, down)))
+        };
+        let bands = (1..=columns).filter_map(fewest).min_by_key(|(bands, _)| *bands);
+        rect.cover(bands.map_or([WIDEST, TILE], |(_, size)| size))
     }
 
-    /// The plan of a band of these rows.
-    pub(super) fn plan(&self, layout: &Layout, rows: Range<usize>) -> BandPlan {
-        let (blocks, all) = (self.blocks_at_a_time(layout, rows.len()), layout.planes());
-        let used = self.bytes(layout.frames, Planes { all, doubles: 0 }, rows.len(), blocks);
-        let left = self.available.saturating_sub(used) / self.double_bytes(rows.len()).max(1);
-        // The lowest band fits with all planes in f64.
+    /// The plan of a band of these pixels.
+    pub(super) fn plan(&self, layout: &Layout, rect: TileRect) -> BandPlan {
+        let (size, all) = (rect.size(), layout.planes());
+        let blocks = self.blocks_at_a_time(layout, size);
+        let used = self.bytes(layout.frames, Planes { all, doubles: 0 }, size, blocks);
+        let left = self.available.saturating_sub(used) / self.double_bytes(size).max(1);
+        // The smallest band fits with all planes in f64.
         let doubles = self.all_double(all).doubles;
-        let most = if rows.len() <= TILE { doubles } else { left.min(doubles) };
-        BandPlan { rows, blocks, room: DoubleRoom::new(most) }
+        let most = if self.is_smallest(size) { doubles } else { left.min(doubles) };
+        BandPlan { rect, blocks, room: DoubleRoom::new(most) }
+    }
+
+    fn is_smallest(&self, size: [usize; 2]) -> bool {
+        size[0] <= WIDEST && size[1] <= TILE
     }
 
     /// Learns from a splatted band how many planes need sums in f64. If it had too little room, it shows only some of
@@ -226,14 +265,14 @@ impl<'a> Budget<'a> {
     /// Bytes that a splatted band had, with all that does not depend on bands.
     pub(super) fn granted_bytes(&self, layout: &Layout, band: &BandPlan) -> usize {
         let planes = Planes { all: layout.planes(), doubles: band.room.granted() };
-        self.fixed + self.bytes(layout.frames, planes, band.rows.len(), band.blocks)
+        self.fixed + self.bytes(layout.frames, planes, band.rect.size(), band.blocks)
     }
 
-    /// How many blocks to decode at a time while a band of `rows` is splatted.
-    fn blocks_at_a_time(&self, layout: &Layout, rows: usize) -> usize {
+    /// How many blocks to decode at a time while a band of `size` pixels is splatted.
+    fn blocks_at_a_time(&self, layout: &Layout, size: [usize; 2]) -> usize {
         let all = layout.planes();
-        let planes = if rows <= TILE { self.all_double(all) } else { self.planes(all) };
-        let used = self.bytes(layout.frames, planes, rows, 0);
+        let planes = if self.is_smallest(size) { self.all_double(all) } else { self.planes(all) };
+        let used = self.bytes(layout.frames, planes, size, 0);
         // The lattice reads its blocks plane by plane, so few blocks stay in the caches.
         let most = if self.setups.iter().any(|setup| setup.backend.is_lattice()) {
             rayon::current_num_threads()
@@ -244,14 +283,15 @@ impl<'a> Budget<'a> {
     }
 }
 
-/// The preferred minimum height of a band, in tiles: a block that reaches over a band's edge is decoded for both bands.
-const FEW_ROWS: usize = 4;
+/// The preferred least width and height of a band: a block that reaches over a band's edge is decoded for both bands.
+const PREFERRED: usize = 128;
 
 /// Bytes that do not depend on how the work is divided, weights included.
 fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {
     let [width, height] = config.size();
-    let ones = |setup: &ViewSetup| setup.backend.ones_bytes(width, height);
-    memory::FIXED + setups.len() * width * height * WEIGHT_BYTES + setups.iter().map(ones).sum::<usize>()
+    let ones = |setup: &ViewSetup| setup.backend.ones_bytes(config.size());
+    let weights = WEIGHT_BYTES + if config.certify { BEYOND_BYTES } else { 0 };
+    memory::FIXED + setups.len() * width * height * weights + setups.iter().map(ones).sum::<usize>()
 }
 
 /// The largest number of requested frames in one batch.

@@ -5,6 +5,7 @@ use super::plan::Budget;
 use super::weight_sums::WeightSums;
 use crate::render::batches::{BlockPlanes, BlockReader, BlockSource, Layout, Order, UnitValues};
 use crate::render::config::RenderConfig;
+use crate::render::splat::tile_rect::TileRect;
 use crate::render::splat::{BandAccumulator, DoubleRoom, FilteredCells, Pixels, ResolvedTile, ViewSetup, splat};
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::BlockGrid;
@@ -39,18 +40,17 @@ fn splat_ones(setup: &ViewSetup, budget: &Budget<'_>) -> Result<(Vec<f64>, Optio
     let layout =
         Layout { coefficients: 1, frames: 1, values: false, absent: false, error_planes: 0, order: Order::Planes };
     let (mut out, mut cells) = (vec![0.0; setup.pixels()], None);
-    let (mut start, end) = (0, setup.camera.size[1]);
     let blocks: Vec<usize> = setup.blocks.touching(&setup.clip).collect();
-    while start < end {
-        // The cells of a lattice are kept whole.
-        let is_whole = setup.backend.is_lattice();
-        let plan = if is_whole { budget.plan(&layout, 0..end) } else { budget.band(&layout, start) };
-        let mut accumulator = BandAccumulator::new(setup, plan.rows.clone(), &layout);
+    let whole = TileRect::whole(setup.camera.size);
+    // The cells of a lattice are kept whole.
+    let bands = if setup.backend.is_lattice() { vec![whole] } else { budget.split(&layout, &whole) };
+    for band in bands {
+        let plan = budget.plan(&layout, band);
+        let mut accumulator = BandAccumulator::new(setup, plan.rect, &layout);
         let reader = BlockReader { source: &Ones(&setup.blocks), at_a_time: plan.blocks, progress: &Silent };
         splat(std::slice::from_mut(&mut accumulator), &blocks, &reader, &DoubleRoom::new(1))?;
         accumulator.finish(&mut out, |mut tile, pixels| put_first_plane(&mut tile, pixels));
         cells = accumulator.into_filtered();
-        start = plan.rows.end;
     }
     Ok((out, cells))
 }

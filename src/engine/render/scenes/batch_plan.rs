@@ -111,8 +111,12 @@ fn layout(
 fn few_asked(file: &CoefficientFile, codec: &WindowCodec, window: u32, config: &RenderConfig) -> bool {
     let range = file.window_range(window);
     let asked: Vec<usize> = config.frames.iter().filter(|f| range.contains(f)).map(|f| f - range.start).collect();
-    let needed = needed(&codec.synthesis, &asked).into_iter().filter(|needed| *needed).count();
-    COEFFICIENTS_FOR_A_VALUE * asked.len() <= needed
+    are_few(asked.len(), needed(&codec.synthesis, &asked).into_iter().filter(|needed| *needed).count())
+}
+
+/// Whether so many frames are few beside the coefficients that they need.
+pub(super) fn are_few(frames: usize, coefficients: usize) -> bool {
+    COEFFICIENTS_FOR_A_VALUE * frames <= coefficients
 }
 
 /// As measured, values and coefficients take the same time for half as many frames as coefficients; for a quarter,

@@ -134,7 +134,7 @@ fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut 
     if plan.few {
         add_coefficients(plan, block, field, &mut values);
     } else if !block.is_zero() {
-        put_runs(plan, block, &mut values);
+        put_runs(plan, block, field, &mut values);
     }
     for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
         few.drain(..).for_each(|(voxel, value)| values[voxel as usize] += value);
@@ -154,14 +154,18 @@ fn add_coefficients(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, 
 }
 
 /// Stores the values of a plan's frames by the inverse transform.
-fn put_runs(plan: &BatchPlan, block: &Block, values: &mut [f64]) {
+fn put_runs(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, values: &mut [f64]) {
     let mut places = vec![None; plan.codec.frames()];
     plan.wanted.frames.iter().enumerate().for_each(|(i, frame)| places[*frame] = Some(i));
-    block.for_each_run(&plan.codec, &plan.wanted, |first, run| {
+    let put = |first: usize, run: &[f64]| {
         if let Some(place) = places[first / block.voxels] {
             values[place * block.voxels + first % block.voxels..][..run.len()].copy_from_slice(run);
         }
-    });
+    };
+    match field {
+        Some(field) => block.for_each_run_of(&plan.codec, field, &plan.wanted, put),
+        None => block.for_each_run(&plan.codec, &plan.wanted, put),
+    }
 }
 
 /// For each plane of a plan, the values that correct the coefficients at single voxels; empty if there are none.

@@ -15,7 +15,7 @@ use crate::render::batches::{
 };
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::report::LeftOut;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
 use wavesplat_core::base::memory::MOST_BLOCKS;
@@ -56,7 +56,9 @@ impl CoefficientScene {
             // In other modes, which blocks are hidden is known later.
             if config.mode.is_projection() {
                 let batch = CoefficientBatch::open(&self.file, self.what, &BatchRequest { frames, ..*request })?;
-                batch.gather(&batch.selection.blocks, prefetch)?;
+                let mut blocks = batch.selection.blocks.clone();
+                self.file.blocks.sort_nested(&mut blocks);
+                batch.gather(&blocks, prefetch)?;
             }
             *fetched = frames[frames.len() - 1] + 1;
             Ok(())
@@ -104,8 +106,9 @@ impl Scene for CoefficientScene {
         self.needs.most_planes(frames, config)
     }
 
-    fn block_bytes(&self) -> usize {
-        self.needs.block_bytes
+    fn block_bytes(&self, frames: usize, config: &RenderConfig) -> usize {
+        let asked = self.file.by_window(&config.frames).map(<[usize]>::len);
+        self.needs.block_bytes(frames, asked, config.mode.is_projection())
     }
 
     fn shared_bytes(&self, memory: usize) -> usize {
@@ -134,8 +137,6 @@ pub(super) struct CoefficientBatch<'a> {
     selector: BlockSelector,
     selection: Selection,
     errors: SampleErrors,
-    /// The last leaf of the directory that was read. Blocks come in order, so most reads hit it.
-    leaf: Mutex<Arc<Vec<BlockEntry>>>,
 }
 
 impl<'a> CoefficientBatch<'a> {
@@ -153,7 +154,6 @@ impl<'a> CoefficientBatch<'a> {
             views: request.views,
             selection: Selection::default(),
             errors: SampleErrors::default(),
-            leaf: Mutex::default(),
         };
         batch.select(request.config)?;
         Ok(batch)
@@ -281,13 +281,8 @@ impl<'a> CoefficientBatch<'a> {
 
     /// The entries of the directory's leaf that lists a block.
     fn leaf_of(&self, block: u32) -> Result<Arc<Vec<BlockEntry>>> {
-        let mut last = self.leaf.lock().unwrap_or_else(PoisonError::into_inner);
-        if !last.iter().any(|entry| entry.id.block == block) {
-            let leaves = self.file.leaves_of(self.window, self.channel);
-            let leaf = &leaves[leaves.partition_point(|l| l.first_block <= block) - 1];
-            *last = Arc::new(self.file.leaf(leaf)?);
-        }
-        Ok(last.clone())
+        let leaves = self.file.leaves_of(self.window, self.channel);
+        self.file.kept_leaf(&leaves[leaves.partition_point(|l| l.first_block <= block) - 1])
     }
 
     /// Looks up a block in the directory, and selects its parts to read.

@@ -83,7 +83,7 @@ impl Scene for FrameScene {
         2 * frames + 1
     }
 
-    fn block_bytes(&self) -> usize {
+    fn block_bytes(&self, _frames: usize, _config: &RenderConfig) -> usize {
         // One plane of a block, in the type of the samples and as f64.
         let read = self.colour_transform.as_ref().map_or(0, |colour_transform| colour_transform.sample.size());
         self.blocks().region(0).voxels() * (self.archive.sample.size() + read + 8)

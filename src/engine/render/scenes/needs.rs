@@ -1,15 +1,36 @@
 //! The memory that the blocks of a file need, found once for all batches.
 
-use super::batch_plan::{SplatSource, error_planes};
+use super::batch_plan::{SplatSource, are_few, error_planes};
 use crate::file::CoefficientFile;
 use crate::render::config::RenderConfig;
+use wavesplat_format::{Axis, LeafEntry, Window};
 
 /// Upper bounds for all windows of a file.
 pub(super) struct FileNeeds {
     /// Each kind of window once.
     windows: Vec<WindowKind>,
-    /// The largest block as it is read and decoded.
-    pub(super) block_bytes: usize,
+    what: SplatSource,
+    block: BlockNeeds,
+}
+
+/// Bytes of the largest block, by what is done with it.
+struct BlockNeeds {
+    /// What is read: codes, what is stored exactly, and the nodes that the block begins with.
+    read: usize,
+    /// The block above while it is decoded, before the block is read.
+    above: usize,
+    /// All coefficients decoded at once, and scratch.
+    whole: usize,
+    /// Those of one k.
+    one: usize,
+    /// Whether some blocks need all coefficients at once however they are splatted.
+    always_whole: bool,
+    /// Samples of all frames of a window in their own type.
+    samples: usize,
+    /// Values of a frame.
+    values: usize,
+    /// The largest number of coefficients of a voxel.
+    coefficients: usize,
 }
 
 /// What decides the number of planes of a window.
@@ -24,8 +45,10 @@ struct WindowKind {
     missing: bool,
 }
 
-/// Bytes of a stored code or outlier: packed, and unpacked in vectors that grow.
-const STORED_BYTES: usize = 20;
+/// Bytes of a stored code: its place and value, and what it is unpacked from.
+const CODE_BYTES: usize = 14;
+/// Bytes of an outlier or a missing sample: its place and value, and the corrections that it becomes, in vectors that grow.
+const OUTLIER_BYTES: usize = 128;
 
 impl FileNeeds {
     pub(super) fn new(file: &CoefficientFile, what: SplatSource) -> Self {
@@ -33,8 +56,19 @@ impl FileNeeds {
         let mut windows: Vec<WindowKind> = (0..count).map(|window| WindowKind::new(file, what, window)).collect();
         windows.sort_unstable();
         windows.dedup();
-        let block_bytes = block_bytes(file, windows.iter().any(|window| window.missing));
-        Self { windows, block_bytes }
+        let block = BlockNeeds::new(file, windows.iter().any(|window| window.missing));
+        Self { windows, what, block }
+    }
+
+    /// Bytes of a decoded block for a batch of `frames` frames. Windows are asked for `asked` frames each.
+    pub(super) fn block_bytes(&self, frames: usize, asked: impl Iterator<Item = usize>, is_projection: bool) -> usize {
+        let BlockNeeds { read, above, whole, one, always_whole, samples, values, coefficients } = self.block;
+        if self.what == SplatSource::Samples {
+            return above.max(read + whole + samples);
+        }
+        let coded = if always_whole || !is_projection { whole } else { one };
+        let few = asked.filter(|asked| is_projection && are_few(*asked, coefficients)).max();
+        above.max(read + coded + values * if is_projection { few.unwrap_or(0) } else { frames })
     }
 
     /// The largest number of planes of a projection of `frames` frames.
@@ -62,17 +96,35 @@ impl WindowKind {
     }
 }
 
-fn block_bytes(file: &CoefficientFile, is_missing: bool) -> usize {
-    let windows = &file.metadata().windows;
-    let leaves = || (0..windows.len() as u32).flat_map(|window| file.leaves(window));
-    let is_double = windows.iter().filter_map(|w| w.pyramid.as_ref()).any(|pyramid| !pyramid.single);
-    // Codes or nodes, and the values of all frames; what is stored exactly; a mask and corrections.
-    let refined = if is_double { size_of::<f64>() } else { size_of::<f32>() } + size_of::<f64>();
-    let exact = if leaves().any(|leaf| leaf.exact > 0) { 2 * file.sample().size() } else { 0 };
-    let missing = if is_missing { 1 + 32 + 24 } else { 0 };
-    let stored = leaves().map(|leaf| leaf.coded.saturating_add(leaf.outliers) as usize).max().unwrap_or(0);
-    let largest = file.largest_block();
-    largest * (refined + exact + missing)
-        + stored.min(2 * largest) * STORED_BYTES
-        + file.bytes_to_begin(refined + STORED_BYTES / 2)
+impl BlockNeeds {
+    fn new(file: &CoefficientFile, is_missing: bool) -> Self {
+        let windows = &file.metadata().windows;
+        let leaves = || (0..windows.len() as u32).flat_map(|window| file.leaves(window));
+        let (largest, stored, coefficient) = (file.largest_block(), file.most_codes(), file.coefficient_size());
+        let most = |count: fn(&LeafEntry) -> u64| leaves().map(count).max().unwrap_or(0).min(stored as u64) as usize;
+        let codes = match windows.iter().all(|window| window.pyramid.is_some()) {
+            true => most(|leaf| leaf.coded) * CODE_BYTES,
+            false => stored * (CODE_BYTES + size_of::<i32>()),
+        };
+        let exact = if leaves().any(|leaf| leaf.exact > 0) { 2 * stored * file.sample().size() } else { 0 };
+        let outliers = match file.skips_damage() {
+            true => stored,
+            false => most(|leaf| leaf.outliers.saturating_add(leaf.missing)),
+        };
+        let mask = if is_missing { stored } else { 0 };
+        let refines_time = |window: &Window| window.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
+        // Scratch are the lattices before the last passes: of one k at a time, unless time is refined.
+        let plane = file.blocks.region(0).voxels();
+        let refined = |coefficients: usize| (coefficients + plane).max(coefficients * 3 / 2) * coefficient;
+        Self {
+            read: codes + exact + outliers * OUTLIER_BYTES + mask + file.known_bytes(),
+            above: file.largest_block_above() * CODE_BYTES + refined(file.largest_block_above()),
+            whole: refined(largest),
+            one: refined(plane),
+            always_whole: outliers > 0 || windows.iter().any(refines_time),
+            samples: largest * file.sample().size(),
+            values: plane * size_of::<f64>(),
+            coefficients: file.most_coefficients(),
+        }
+    }
 }

@@ -9,7 +9,6 @@ use super::tile_rect::{TILE, TileRect};
 use super::view_setup::ViewSetup;
 use crate::render::batches::{BlockReader, Layout, ReadStats};
 use rayon::prelude::*;
-use std::ops::Range;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::wavelet::Lane;
 
@@ -30,17 +29,15 @@ enum BandSums<'a> {
 }
 
 impl<'a> BandAccumulator<'a> {
-    /// A band of `rows` of a picture with all planes at zero.
-    pub(in crate::render) fn new(setup: &'a ViewSetup, rows: Range<usize>, layout: &Layout) -> Self {
-        let (width, planes) = (setup.camera.size[0], layout.planes());
+    /// The band of a picture with these pixels, and all planes at zero.
+    pub(in crate::render) fn new(setup: &'a ViewSetup, rect: TileRect, layout: &Layout) -> Self {
+        let planes = layout.planes();
         let tile = |rect| Tile::new(rect, planes, layout.order);
         let sums = match &setup.backend {
-            SplatBackend::Lattice(lattice) => BandSums::Cells(lattice, lattice.cells_of(width, &rows, planes)),
-            SplatBackend::Footprints => {
-                BandSums::Tiles(TileRect::cover(width, rows.clone(), [TILE; 2]).into_iter().map(tile).collect())
-            }
+            SplatBackend::Lattice(lattice) => BandSums::Cells(lattice, lattice.cells_of(&rect, planes)),
+            SplatBackend::Footprints => BandSums::Tiles(rect.cover([TILE; 2]).into_iter().map(tile).collect()),
         };
-        Self { band: Band { setup, rows }, planes, ones: None, sums }
+        Self { band: Band { setup, rect }, planes, ones: None, sums }
     }
 
     /// The same, rounded relative to the image of ones.
@@ -72,8 +69,8 @@ impl<'a> BandAccumulator<'a> {
         finish: impl Fn(ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync,
     ) {
         let (width, tile) = (self.band.setup.camera.size[0], self.band.setup.backend.tile());
-        let columns = width.div_ceil(tile[0]);
-        let rects = TileRect::cover(width, self.band.rows.clone(), tile);
+        let columns = self.band.rect.x.len().div_ceil(tile[0]);
+        let rects = self.band.rect.cover(tile);
         let bands = self.by_rows_of_tiles(pictures, tile[1]);
         rects.par_chunks(columns).zip(bands).enumerate().for_each(|(n, (rects, planes))| {
             let mut pixels = Pixels { planes, width, top: rects[0].y.start };
@@ -98,11 +95,11 @@ impl<'a> BandAccumulator<'a> {
 
     /// For every row of tiles, its rows of every picture.
     fn by_rows_of_tiles<'p, T>(&self, pictures: &'p mut [T], height: usize) -> Vec<Vec<&'p mut [T]>> {
-        let [width, rows] = self.band.setup.camera.size;
+        let ([width, rows], TileRect { y, .. }) = (self.band.setup.camera.size, &self.band.rect);
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
-        bands.resize_with(self.band.rows.len().div_ceil(height), Vec::new);
+        bands.resize_with(y.len().div_ceil(height), Vec::new);
         for picture in pictures.chunks_exact_mut(width * rows) {
-            let rows = picture[self.band.rows.start * width..self.band.rows.end * width].chunks_mut(height * width);
+            let rows = picture[y.start * width..y.end * width].chunks_mut(height * width);
             bands.iter_mut().zip(rows).for_each(|(band, rows)| band.push(rows));
         }
         bands

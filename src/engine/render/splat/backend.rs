@@ -4,7 +4,7 @@
 //! reached, tile sizes, memory) and hands it blocks through [`super::accumulator`].
 
 use super::lattice::{Lattice, SliceError, SplattedView};
-use super::tile_rect::{TILE, pixels_reached};
+use super::tile_rect::{TILE, TileRect, pixels_reached};
 use crate::render::config::{BACKGROUND, Quantity, RenderConfig, most_splat_error, splat_method};
 use std::ops::Range;
 use std::sync::Arc;
@@ -79,37 +79,51 @@ impl SplatBackend {
         }
     }
 
-    /// Whether the tiles of these rows read sums that voxels of a region add to.
-    pub(super) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
+    /// Whether the tiles of these pixels read sums that voxels of a region add to.
+    pub(super) fn tiles_read(&self, region: &Region, pixels: &TileRect) -> bool {
         match self {
             Self::Footprints => false, // every sum belongs to a pixel
-            Self::Lattice(lattice) => lattice.tiles_read(region, width, rows),
+            Self::Lattice(lattice) => lattice.tiles_read(region, pixels),
         }
     }
 
-    /// An upper bound of the bytes for `planes` planes in a band of `width` x `rows` pixels, without
-    /// [`Self::double_bytes`].
-    pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
+    /// An upper bound of the bytes for `planes` planes in a band of `size` pixels, without [`Self::double_bytes`].
+    pub(in crate::render) fn band_bytes(&self, size: [usize; 2], planes: usize) -> usize {
         match self {
-            Self::Footprints => planes * width * rows.next_multiple_of(TILE) * size_of::<f64>(),
-            Self::Lattice(lattice) => lattice.band_bytes(width, rows, planes),
+            Self::Footprints => planes * size[0] * size[1].next_multiple_of(TILE) * size_of::<f64>(),
+            Self::Lattice(lattice) => lattice.band_bytes(size, planes),
+        }
+    }
+
+    /// An upper bound of the bytes that a thread that gathers a tile copies of a plane with sums in f64.
+    pub(in crate::render) fn copied_bytes(&self) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.copied_bytes(),
         }
     }
 
     /// An upper bound of the bytes that a plane of a band takes in addition if it needs sums in f64.
-    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
+    pub(in crate::render) fn double_bytes(&self, size: [usize; 2]) -> usize {
         match self {
             Self::Footprints => 0,
-            Self::Lattice(lattice) => lattice.double_bytes(width, rows),
+            Self::Lattice(lattice) => lattice.double_bytes(size),
         }
     }
 
-    /// An upper bound of the bytes for the sums of the whole picture that a lattice keeps: the cells of ones, and as many
-    /// while they are filtered.
-    pub(in crate::render) fn ones_bytes(&self, width: usize, height: usize) -> usize {
+    /// An upper bound of the bytes for the cells of ones of the whole picture, which a lattice keeps.
+    pub(in crate::render) fn ones_bytes(&self, size: [usize; 2]) -> usize {
         match self {
             Self::Footprints => 0,
-            Self::Lattice(lattice) => 2 * lattice.plane_bytes(width, height),
+            Self::Lattice(lattice) => lattice.plane_bytes(size),
+        }
+    }
+
+    /// An upper bound of the bytes to make these cells, in addition to them.
+    pub(in crate::render) fn bytes_while_ones(&self, size: [usize; 2]) -> usize {
+        match self {
+            Self::Footprints => 0,
+            Self::Lattice(lattice) => lattice.band_bytes(size, 1) + lattice.plane_bytes(size),
         }
     }
 
@@ -121,7 +135,8 @@ impl SplatBackend {
         }
     }
 
-    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
+    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes, without
+    /// [`Self::copied_bytes`].
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
         match self {
             Self::Footprints => 0,

@@ -1,22 +1,22 @@
-//! Bands of pictures, into which blocks are splatted in file order.
+//! Bands of pictures, into which blocks are splatted in a fixed order.
 
+use super::tile_rect::TileRect;
 use super::view_setup::ViewSetup;
 use crate::render::batches::{BlockAdder, BlockReader, ReadStats};
-use std::ops::Range;
 use wavesplat_core::base::error::Result;
 
-/// A band of rows of a view's picture.
+/// A band of a view's picture: some rows, or a part of their columns.
 #[derive(Clone)]
 pub(super) struct Band<'a> {
     pub(super) setup: &'a ViewSetup,
-    pub(super) rows: Range<usize>,
+    pub(super) rect: TileRect,
 }
 
 impl Band<'_> {
     /// Whether a block must be splatted into this band: the picture sees it, and the band needs it.
     pub(super) fn sees(&self, block: usize) -> bool {
-        let whole = 0..self.setup.camera.size[1];
-        self.setup.sees(block, &whole) && (self.rows == whole || self.setup.needs(block, &self.rows))
+        let is_whole = self.rect == TileRect::whole(self.setup.camera.size);
+        self.setup.sees(block) && (is_whole || self.setup.needs(block, &self.rect))
     }
 }
 

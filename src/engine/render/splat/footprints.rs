@@ -1,7 +1,7 @@
 //! The footprint backend: adds values of voxels times footprints to the planes of one tile of the picture (eq 9; eq 4
 //! if the values are samples). This is the splatting of [Westover](wavesplat_core::bibliography).
 //!
-//! A tile has one owner and adds blocks and voxels in file order, so a pixel's sum depends neither on the tiles nor on
+//! A tile has one owner and adds blocks and voxels in a fixed order, so a pixel's sum depends neither on the tiles nor on
 //! the number of threads. Sums are in f64.
 
 use super::band::{Band, BandGroup};

@@ -7,9 +7,11 @@ use wavesplat_core::view::footprint::Footprint;
 
 /// Pixels per side of a tile: its planes fit in a core's cache, and neighbours share few footprints.
 pub(in crate::render) const TILE: usize = 64;
+/// The width of the widest tile in pixels, a multiple of that of all others.
+pub(in crate::render) const WIDEST: usize = 2 * TILE;
 
 /// A rectangle of pixels.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::render) struct TileRect {
     /// Columns of the picture.
     pub(in crate::render) x: Range<usize>,
@@ -18,11 +20,21 @@ pub(in crate::render) struct TileRect {
 }
 
 impl TileRect {
-    /// Tiles of the size `tile` that cover the rows `y` of a picture `width` pixels wide. Tiles at the right and lower
-    /// edges may be smaller.
-    pub(in crate::render) fn cover(width: usize, y: Range<usize>, tile: [usize; 2]) -> Vec<Self> {
+    /// A whole picture.
+    pub(in crate::render) fn whole([width, height]: [usize; 2]) -> Self {
+        Self { x: 0..width, y: 0..height }
+    }
+
+    /// Tiles of the size `tile` that cover the rectangle, row by row. Tiles at the right and lower edges may be smaller.
+    pub(in crate::render) fn cover(&self, tile: [usize; 2]) -> Vec<Self> {
         let pieces = |r: Range<usize>, most: usize| r.clone().step_by(most).map(move |s| s..(s + most).min(r.end));
-        pieces(y, tile[1]).flat_map(|y| pieces(0..width, tile[0]).map(move |x| Self { x, y: y.clone() })).collect()
+        let of_row = |y: Range<usize>| pieces(self.x.clone(), tile[0]).map(move |x| Self { x, y: y.clone() });
+        pieces(self.y.clone(), tile[1]).flat_map(of_row).collect()
+    }
+
+    /// Width and height in pixels.
+    pub(in crate::render) fn size(&self) -> [usize; 2] {
+        [self.x.len(), self.y.len()]
     }
 
     /// Number of pixels.
@@ -84,12 +96,13 @@ mod tests {
 
     #[test]
     fn tiles_cover_each_pixel_once() {
-        let mut counts = vec![0; 150 * 100];
-        for rect in TileRect::cover(150, 30..100, [TILE; 2]) {
+        let (mut counts, all) = (vec![0; 150 * 100], TileRect { x: 20..140, y: 30..100 });
+        for rect in all.cover([TILE; 2]) {
             for y in rect.y.clone() {
                 rect.x.clone().for_each(|x| counts[y * 150 + x] += 1);
             }
         }
-        assert!(counts[..30 * 150].iter().all(|n| *n == 0) && counts[30 * 150..].iter().all(|n| *n == 1));
+        let is_inside = |at: usize| all.x.contains(&(at % 150)) && all.y.contains(&(at / 150));
+        assert!(counts.iter().enumerate().all(|(at, n)| *n == usize::from(is_inside(at))));
     }
 }

@@ -3,7 +3,7 @@
 use super::backend::{SplatBackend, footprint_method};
 use super::lattice::SplattedView;
 use super::reference_weights::ReferenceWeights;
-use super::tile_rect::overlap;
+use super::tile_rect::{TileRect, overlap};
 use crate::render::config::{Quantity, RenderConfig, most_splat_error};
 use std::ops::Range;
 use wavesplat_core::base::error::{Error, Result};
@@ -65,20 +65,21 @@ impl ViewSetup {
         self.camera.nearest_of(&self.grid.crop(&self.blocks.region(block))) > self.deepest
     }
 
-    /// Whether a block must be splatted into these rows of the picture.
-    pub(in crate::render) fn sees(&self, block: usize, rows: &Range<usize>) -> bool {
-        self.reaches(block, rows) && !self.is_too_deep(block)
+    /// Whether a block must be splatted into the picture.
+    pub(in crate::render) fn sees(&self, block: usize) -> bool {
+        self.reaches(block, &TileRect::whole(self.camera.size)) && !self.is_too_deep(block)
     }
 
-    /// Whether these rows of a picture change if a block that the picture sees is left out.
-    pub(in crate::render) fn needs(&self, block: usize, rows: &Range<usize>) -> bool {
+    /// Whether these pixels change if a block that the picture sees is left out.
+    pub(in crate::render) fn needs(&self, block: usize, pixels: &TileRect) -> bool {
         let region = self.blocks.region(block).intersect(&self.clip);
-        self.reaches(block, rows) || !region.is_empty() && self.backend.tiles_read(&region, self.camera.size[0], rows)
+        self.reaches(block, pixels) || !region.is_empty() && self.backend.tiles_read(&region, pixels)
     }
 
-    /// Whether any voxel of a block can reach these rows of the picture.
-    pub(in crate::render) fn reaches(&self, block: usize, rows: &Range<usize>) -> bool {
-        overlap(&self.pixels_reached(&self.blocks.region(block))[1], rows)
+    /// Whether any voxel of a block can reach these pixels.
+    pub(in crate::render) fn reaches(&self, block: usize, pixels: &TileRect) -> bool {
+        let [x, y] = self.pixels_reached(&self.blocks.region(block));
+        overlap(&x, &pixels.x) && overlap(&y, &pixels.y)
     }
 
     /// The columns and rows that any voxel of a region can reach.

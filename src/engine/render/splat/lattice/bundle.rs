@@ -4,6 +4,7 @@
 //! the image of ones known, in f32, less the mean of the plane over the tile, so that rounding is relative to the range
 //! of values, not to their size; otherwise in f64.
 
+use super::cells::TOGETHER;
 use super::filtered::{FilteredCells, Group, Window, places};
 use std::borrow::Cow;
 use wavesplat_core::codec::real::Real;
@@ -39,22 +40,20 @@ pub(super) struct Bundles<'a> {
 impl<'a> Bundles<'a> {
     /// The bundles for the cells in `tile`. The ones are the filtered cells of the value 1 at all voxels.
     pub(super) fn new(cells: &'a FilteredCells, tile: &Window, ones: Option<&FilteredCells>) -> Self {
-        let offset = cells.doubles.iter();
-        let offset = offset.filter_map(|(number, sums)| OffsetPlane::new(cells, *number, sums, tile));
-        let offset: Vec<OffsetPlane> = offset.collect();
-        let is_offset = |number: usize| offset.iter().any(|plane| plane.number == number);
-        let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, is_offset)).collect();
-        let double = cells.double_groups.iter().filter_map(|group| of_group(cells, group, tile, |_| false)).collect();
-        let mut bundles = Self { single, double };
-        if offset.is_empty() {
-            return bundles;
+        let ones = ones.filter(|_| !cells.doubles.is_empty()).map(|ones| ones_in(ones, tile));
+        let (apart, precise) = match &ones {
+            Some(ones) => (apart(cells, tile, |number, sums| ApartPlane::less_mean(number, sums, ones)), Vec::new()),
+            None => (Vec::new(), apart(cells, tile, ApartPlane::as_it_is)),
+        };
+        let numbers = apart.iter().map(|plane| plane.stored.number);
+        let numbers: Vec<usize> = numbers.chain(precise.iter().map(|plane| plane.stored.number)).collect();
+        let is_apart = |number: usize| numbers.contains(&number);
+        let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, is_apart));
+        let double = cells.double_groups.iter().filter_map(|group| of_group(cells, group, tile, |_| false));
+        Self {
+            single: single.chain(side_by_side(&apart, tile)).collect(),
+            double: double.chain(side_by_side(&precise, tile)).collect(),
         }
-        let count = places(offset.len());
-        match ones.map(|ones| (ones_in(ones, tile), offset.chunks(count))) {
-            Some((ones, chunks)) => bundles.single.extend(chunks.map(|some| without_means(some, tile, &ones))),
-            None => bundles.double.extend(offset.chunks(count).map(|some| as_they_are(some, tile))),
-        }
-        bundles
     }
 
     /// The planes with sums.
@@ -70,11 +69,11 @@ fn of_group<'a, R: Real>(
     cells: &'a FilteredCells,
     group: &'a Group<R>,
     tile: &Window,
-    is_offset: impl Fn(usize) -> bool,
+    is_apart: impl Fn(usize) -> bool,
 ) -> Option<Bundle<'a, R>> {
     let [(columns, _), (rows, _)] = cells.window.part_in(tile);
     let numbered = group.planes.iter().copied().enumerate();
-    let touched = numbered.filter(|(place, n)| !is_offset(*n) && group.has_sums(*place, &columns, &rows));
+    let touched = numbered.filter(|(place, n)| !is_apart(*n) && group.has_sums(*place, &columns, &rows));
     let planes: Vec<_> = touched.map(|(place, number)| (place, TilePlane { number, mean: 0.0, scale: 1.0 })).collect();
     let is_empty = columns.is_empty() || planes.is_empty();
     let Group { places, stride, .. } = *group;
@@ -83,36 +82,60 @@ fn of_group<'a, R: Real>(
 }
 
 /// A plane with sums in f64 in the tile.
-struct OffsetPlane {
-    number: usize,
-    /// All its sums at the cells of the tile, row by row.
-    sums: Vec<f64>,
+struct ApartPlane<R> {
+    stored: TilePlane,
+    /// What is stored of all its sums at the cells of the tile, row by row.
+    numbers: Vec<R>,
 }
 
-impl OffsetPlane {
-    /// The plane with these sums in f64; `None` if they are zero in the tile.
-    fn new(cells: &FilteredCells, number: usize, double: &[f64], tile: &Window) -> Option<Self> {
-        let mut sums = vec![0.0; tile.size[0] * tile.size[1]];
-        let width = cells.window.size[0];
-        add_part(&cells.window, tile, &mut sums, |u, v| double[v * width + u]);
-        if sums.iter().all(|sum| *sum == 0.0) {
-            return None;
+/// The planes with sums in f64 that are not zero in the tile. `store(number, sums)` takes all sums of a plane.
+fn apart<R>(
+    cells: &FilteredCells,
+    tile: &Window,
+    store: impl Fn(usize, &[f64]) -> ApartPlane<R>,
+) -> Vec<ApartPlane<R>> {
+    let (mut sums, mut planes) = (Vec::new(), Vec::new());
+    for (number, double) in &cells.doubles {
+        if sum_plane(cells, *number, double, tile, &mut sums) {
+            planes.push(store(*number, &sums));
         }
-        for group in &cells.groups {
-            if let Some(place) = group.planes.iter().position(|n| *n == number) {
-                let at = |u, v| (v * group.stride + u) * group.places + place;
-                add_part(&cells.window, tile, &mut sums, |u, v| group.cells[at(u, v)].into());
-            }
-        }
-        Some(Self { number, sums })
     }
+    planes
+}
 
-    /// How the plane is stored without its mean. The ones have the sum `ones` in the tile.
-    fn less_mean(&self, ones: f64) -> TilePlane {
-        let most = self.sums.iter().fold(0.0_f64, |most, sum| most.max(sum.abs()));
-        let mean = if ones == 0.0 { 0.0 } else { self.sums.iter().sum::<f64>() / ones };
+/// Puts all sums of a plane at the cells of the tile into `sums`. False if those in f64, `double`, are zero there.
+fn sum_plane(cells: &FilteredCells, number: usize, double: &[f64], tile: &Window, sums: &mut Vec<f64>) -> bool {
+    sums.clear();
+    sums.resize(tile.size[0] * tile.size[1], 0.0);
+    let width = cells.window.size[0];
+    add_part(&cells.window, tile, sums, |u, v| double[v * width + u]);
+    if sums.iter().all(|sum| *sum == 0.0) {
+        return false;
+    }
+    for group in &cells.groups {
+        if let Some(place) = group.planes.iter().position(|n| *n == number) {
+            let at = |u, v| (v * group.stride + u) * group.places + place;
+            add_part(&cells.window, tile, sums, |u, v| group.cells[at(u, v)].into());
+        }
+    }
+    true
+}
+
+impl ApartPlane<f32> {
+    /// The plane less its mean over the tile, where the value 1 at all voxels has the sums `ones`.
+    fn less_mean(number: usize, sums: &[f64], ones: &[f64]) -> Self {
+        let most = sums.iter().fold(0.0_f64, |most, sum| most.max(sum.abs()));
+        let total = ones.iter().sum::<f64>();
+        let mean = if total == 0.0 { 0.0 } else { sums.iter().sum::<f64>() / total };
         let scale = if (UNSCALED[0]..=UNSCALED[1]).contains(&most) { 1.0 } else { most };
-        TilePlane { number: self.number, mean, scale }
+        let numbers = sums.iter().zip(ones).map(|(sum, one)| ((sum - mean * one) / scale) as f32);
+        Self { stored: TilePlane { number, mean, scale }, numbers: numbers.collect() }
+    }
+}
+
+impl ApartPlane<f64> {
+    fn as_it_is(number: usize, sums: &[f64]) -> Self {
+        Self { stored: TilePlane { number, mean: 0.0, scale: 1.0 }, numbers: sums.to_vec() }
     }
 }
 
@@ -139,34 +162,18 @@ fn ones_in(ones: &FilteredCells, tile: &Window) -> Vec<f64> {
     sums
 }
 
-/// Planes less their means.
-fn without_means(planes: &[OffsetPlane], tile: &Window, ones: &[f64]) -> Bundle<'static, f32> {
-    let total = ones.iter().sum();
-    let stored: Vec<TilePlane> = planes.iter().map(|plane| plane.less_mean(total)).collect();
-    let number = |n: usize, at: usize| (planes[n].sums[at] - stored[n].mean * ones[at]) / stored[n].scale;
-    side_by_side(&stored, tile, number)
-}
-
-/// Planes in f64.
-fn as_they_are(planes: &[OffsetPlane], tile: &Window) -> Bundle<'static, f64> {
-    let stored = |plane: &OffsetPlane| TilePlane { number: plane.number, mean: 0.0, scale: 1.0 };
-    let stored: Vec<TilePlane> = planes.iter().map(stored).collect();
-    side_by_side(&stored, tile, |n, at| planes[n].sums[at])
-}
-
-/// A tile's own cells. `number(plane, cell)` is stored.
-fn side_by_side<R: Real>(
-    stored: &[TilePlane],
-    tile: &Window,
-    number: impl Fn(usize, usize) -> f64,
-) -> Bundle<'static, R> {
-    let places = places(stored.len());
-    let mut cells = vec![R::default(); tile.size[0] * tile.size[1] * places];
-    for (at, cell) in cells.chunks_exact_mut(places).enumerate() {
-        (0..stored.len()).for_each(|n| cell[n] = R::from_f64(number(n, at)));
-    }
-    let planes = stored.iter().copied().enumerate().collect();
-    Bundle { planes, places, stride: tile.size[0], window: *tile, cells: Cow::Owned(cells) }
+/// A tile's own cells.
+fn side_by_side<'a, R: Real>(planes: &[ApartPlane<R>], tile: &Window) -> Vec<Bundle<'a, R>> {
+    let bundle = |planes: &[ApartPlane<R>]| {
+        let places = places(planes.len());
+        let mut cells = vec![R::default(); tile.size[0] * tile.size[1] * places];
+        for (place, plane) in planes.iter().enumerate() {
+            cells[place..].iter_mut().step_by(places).zip(&plane.numbers).for_each(|(cell, number)| *cell = *number);
+        }
+        let planes = planes.iter().map(|plane| plane.stored).enumerate().collect();
+        Bundle { planes, places, stride: tile.size[0], window: *tile, cells: Cow::Owned(cells) }
+    };
+    planes.chunks(TOGETHER).map(bundle).collect()
 }
 
 /// Sums that are kept apart, so that additions need not wait for each other.

@@ -14,7 +14,7 @@
 //! correct for it afterwards (eq 36, `prefilter`; [Greengard](wavesplat_core::bibliography)). Here the filter is chosen first, and the
 //! weights of voxels are fitted to it (eq 45, `fit`). `error` states by how much a pixel can be off.
 //!
-//! Each plane has one owner and adds blocks in file order, so sums depend neither on threads nor on memory.
+//! Each plane has one owner and adds blocks in a fixed order, so sums depend neither on threads nor on memory.
 
 mod shear;
 mod prefilter;

@@ -11,7 +11,7 @@ use super::prefilter::HALF;
 use super::product::Product;
 use super::shear::Shear;
 use super::{Choice, Placed, Spreading, Sums};
-use crate::render::splat::tile_rect::{TileRect, pixels_around};
+use crate::render::splat::tile_rect::{TILE, TileRect, WIDEST, pixels_around};
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
@@ -87,6 +87,9 @@ const FAR: f64 = 8.0;
 const TILE_CELLS: usize = 4096;
 /// Width of a tile in units of its height, if pixels are summed in two passes.
 const WIDE: usize = 4;
+/// Heights of tiles. Bands begin at multiples of the largest sizes, so that tiles do not depend on bands.
+const SIDES: [usize; 5] = [32, 16, 8, 4, 2];
+const _: () = assert!(TILE.is_multiple_of(SIDES[0]) && WIDEST.is_multiple_of(WIDE * SIDES[0]));
 
 impl Lattice {
     /// The lattice that splats within `error`, and its method for reports; `None` if footprints are better. `stated`
@@ -194,12 +197,14 @@ impl Lattice {
             + SPREADING * clip.voxels() as f64 * width * (q + 1.0)
     }
 
-    /// The f64 numbers that a thread holds while it splats a block, or gathers a tile of `planes` planes.
+    /// The f64 numbers that a thread holds while it splats a block or gathers a tile of `planes` planes, without those that
+    /// [`Self::copied_bytes`] counts.
     pub(in crate::render) fn scratch(&self, block: &Region, planes: usize) -> usize {
         const VALUES: usize = 3; // in their own type, as f32, as f64
-        let tile = area(self.tile_cells(self.tile()).map(|n| n + 2)); // covers rounding and any tile position
-        let in_f32 = side_by_side(planes).div_ceil(2);
-        self.block_cells(block) + VALUES * block.voxels() + (in_f32 + planes + 1) * tile
+        const SUMS: usize = 2; // of a plane with sums in f64, and of ones
+        let splatting = self.block_cells(block) + VALUES * block.voxels();
+        let columns = self.tile_cells(self.tile())[0];
+        splatting.max(columns * (side_by_side(planes) + self.kernel.cells()) + SUMS * self.most_tile_cells())
     }
 
     /// The cells that the voxels of a region reach: the first along each axis, and their number.
@@ -253,12 +258,12 @@ impl Lattice {
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
 
-    /// Whether a block adds to any cell that the tiles of these rows read. Tiles take the mean of all cells that they read, also
+    /// Whether a block adds to any cell that the tiles of these pixels read. Tiles take the mean of all cells that they read, also
     /// of those that no pixel uses ([`super::bundle`]), so bands must not leave such a block out.
-    pub(in crate::render) fn tiles_read(&self, region: &Region, width: usize, rows: &Range<usize>) -> bool {
+    pub(in crate::render) fn tiles_read(&self, region: &Region, pixels: &TileRect) -> bool {
         let window = |(first, size): ([isize; 2], [usize; 2])| Window { first, size };
         let block = window(self.filtered_rectangle(region));
-        TileRect::cover(width, rows.clone(), self.tile()).iter().any(|tile| {
+        pixels.cover(self.tile()).iter().any(|tile| {
             let tile = window(self.cells_reached(&tile.x, &tile.y));
             block.part_in(&tile).iter().all(|(cells, _)| !cells.is_empty())
         })
@@ -270,8 +275,8 @@ impl Lattice {
     }
 
     /// The cells of a band of a picture, with all planes at zero.
-    pub(in crate::render) fn cells_of(&self, width: usize, rows: &Range<usize>, planes: usize) -> Cells {
-        let ((first, size), (low, most)) = (self.cells_reached(&(0..width), rows), self.bounds);
+    pub(in crate::render) fn cells_of(&self, band: &TileRect, planes: usize) -> Cells {
+        let ((first, size), (low, most)) = (self.cells_reached(&band.x, &band.y), self.bounds);
         let start = [0, 1].map(|i| (first[i] - HALF as isize).max(low[i]));
         let end = |i: usize| (first[i] + (size[i] + HALF) as isize).min(low[i] + most[i] as isize);
         let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
@@ -287,7 +292,7 @@ impl Lattice {
     /// the pixels of a row share the sums of columns, so tiles are wide.
     pub(in crate::render) fn tile(&self) -> [usize; 2] {
         let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
-        let side = [32, 16, 8, 4, 2].into_iter().find(fits).unwrap_or(1);
+        let side = SIDES.into_iter().find(fits).unwrap_or(1);
         [if self.product.is_some() { WIDE * side } else { side }, side]
     }
 
@@ -296,28 +301,39 @@ impl Lattice {
         self.cells_reached(&(0..width), &(0..height)).1
     }
 
+    /// An upper bound of the cells that any tile reaches.
+    fn most_tile_cells(&self) -> usize {
+        area(self.tile_cells(self.tile()).map(|n| n + 2)) // covers rounding and any tile position
+    }
+
     /// An upper bound of the bytes for the planes of a band: their sums, and a group of them side by side.
-    pub(in crate::render) fn band_bytes(&self, width: usize, rows: usize, planes: usize) -> usize {
+    pub(in crate::render) fn band_bytes(&self, size: [usize; 2], planes: usize) -> usize {
         let number = match self.spreading.sums {
             Sums::Single => size_of::<f32>(),
             Sums::Double => size_of::<f64>(),
         };
-        (planes + places(planes)) * self.band_cells(width, rows) * number
+        (planes + places(planes)) * self.band_cells(size) * number
     }
 
     /// An upper bound of the bytes for a plane of a band in f64, if it has sums in f32, too.
-    pub(in crate::render) fn double_bytes(&self, width: usize, rows: usize) -> usize {
-        if self.spreading.sums == Sums::Double { 0 } else { self.plane_bytes(width, rows) }
+    pub(in crate::render) fn double_bytes(&self, size: [usize; 2]) -> usize {
+        if self.spreading.sums == Sums::Double { 0 } else { self.plane_bytes(size) }
+    }
+
+    /// An upper bound of the bytes that a thread that gathers a tile copies of such a plane.
+    pub(in crate::render) fn copied_bytes(&self) -> usize {
+        const COPIES: usize = 3; // the sum, and its place in a bundle that may be half empty
+        if self.spreading.sums == Sums::Double { 0 } else { COPIES * self.most_tile_cells() * size_of::<f32>() }
     }
 
     /// An upper bound of the bytes for a plane of a band in f64.
-    pub(in crate::render) fn plane_bytes(&self, width: usize, rows: usize) -> usize {
-        self.band_cells(width, rows) * size_of::<f64>()
+    pub(in crate::render) fn plane_bytes(&self, size: [usize; 2]) -> usize {
+        self.band_cells(size) * size_of::<f64>()
     }
 
     /// An upper bound of the cells of a plane of a band.
-    fn band_cells(&self, width: usize, rows: usize) -> usize {
-        let (size, most) = (self.cells_reached(&(0..width), &(0..rows)).1, self.bounds.1);
+    fn band_cells(&self, [width, height]: [usize; 2]) -> usize {
+        let (size, most) = (self.cells_reached(&(0..width), &(0..height)).1, self.bounds.1);
         self.held([0, 1].map(|i| (size[i] + 2 * HALF + 2).min(most[i]))) // covers rounding and any band position
     }
 
