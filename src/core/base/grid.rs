@@ -167,12 +167,6 @@ pub struct BlockGrid {
     pub edges: [usize; 3],
 }
 
-/// The bits of three numbers in turns, up to 21 of each.
-fn interleaved(numbers: [usize; 3]) -> u64 {
-    let bits = (0..21).flat_map(|bit| (0..3).map(move |a| (bit, a)));
-    bits.fold(0, |all, (bit, a)| all | (numbers[a] as u64 >> bit & 1) << (3 * bit + a))
-}
-
 impl BlockGrid {
     /// A volume cut into cubes of `edge` voxels a side.
     pub fn cubes(dims: [usize; 3], edge: usize) -> Self {
@@ -222,6 +216,12 @@ impl BlockGrid {
         };
         blocks.iter().map(move |[x, y, z]| (z * cy + y) * cx + x)
     }
+}
+
+/// The place in Z-order: the bits of three numbers in turns, up to 21 of each.
+fn interleaved(numbers: [usize; 3]) -> u64 {
+    let bits = (0..21).flat_map(|bit| (0..3).map(move |a| (bit, a)));
+    bits.fold(0, |all, (bit, a)| all | (numbers[a] as u64 >> bit & 1) << (3 * bit + a))
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ pub fn least(needs: impl Fn(usize) -> usize) -> usize {
     (0..32).fold(0, |budget, _| needs(budget))
 }
 
-/// About the most memory that this process has used so far, in bytes, without the files that it maps now. Linux alone tells
-/// it.
+/// About the most memory that this process has used so far, in bytes, without the files that it maps now; too low if it mapped
+/// more files later. `None` except on Linux.
 pub fn peak() -> Option<usize> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let bytes = |name: &str| {

@@ -89,6 +89,7 @@ impl AboveBlocks {
         }
         let entries = Arc::new(read()?);
         let mut leaves = leaves();
+        leaves.retain(|(of, _)| *of != first); // another thread may have read it meanwhile
         leaves.push_back((first, entries.clone()));
         let old = leaves.len().saturating_sub(LEAVES);
         leaves.drain(..old);
@@ -112,12 +113,13 @@ impl AboveBlocks {
     }
 
     /// The place of a decoded block, which becomes the most recently used one: the place in the list, else `decoded`, else a new one.
-    /// The least recently used blocks make room, and what else was decoded of the same block.
+    /// The least recently used blocks make room, and what else was decoded of the same block: readers that take turns with
+    /// other coefficients of a file decode it again.
     fn slot(&self, key: &AboveKey, decoded: Option<&Slot>) -> Slot {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = kept.iter().position(|(of, _)| of == key).map(|at| kept.remove(at).1);
+        let known = kept.iter().position(|(of, _)| of.id == key.id).map(|at| kept.remove(at));
+        let known = known.filter(|(of, _)| of == key).map(|(_, slot)| slot);
         let slot = known.or_else(|| decoded.cloned()).unwrap_or_default();
-        kept.retain(|(of, _)| of.id != key.id);
         kept.push((key.clone(), slot.clone()));
         let old = kept.len().saturating_sub(self.most());
         kept.drain(..old);
@@ -178,7 +180,7 @@ pub(super) fn bytes_above(m: &Metadata) -> usize {
 /// An upper bound of the bytes of the decoded nodes of all blocks above others in a file.
 pub(super) fn bytes_of_all_above(m: &Metadata) -> usize {
     let nodes = |tier: u8| {
-        // Each block has at most one ghost node, and one node more than its share.
+        // Along an axis, a block has at most two nodes beyond its share: a ghost node, and one from rounding.
         let along = |axis: usize| (m.dims[axis].div_ceil(1 << tier) + 2 * m.blocks_per_axis(tier)[axis]) as f64;
         (0..3).map(along).product::<f64>()
     };

@@ -1,6 +1,6 @@
 //! An open coefficient file: the format's reader over any storage, in this library's terms.
 
-use crate::file::above::{AboveBlocks, bytes_above};
+use crate::file::above::{AboveBlocks, bytes_above, nodes_above};
 use crate::file::counted::Counted;
 use crate::file::damage::Damage;
 use crate::file::decoded::DecodedBlocks;
@@ -232,12 +232,26 @@ impl CoefficientFile {
         self.blocks.region(0).voxels() * longest
     }
 
+    /// The codes of the largest block, ghost nodes included, whatever the level of detail.
+    pub(crate) fn most_codes(&self) -> usize {
+        nodes_above(detail::whole(self.metadata()).1) * self.most_coefficients()
+    }
+
+    /// The most coefficients of a voxel.
+    pub(crate) fn most_coefficients(&self) -> usize {
+        self.metadata().windows.iter().map(|window| window.coefficients as usize).max().unwrap_or(0)
+    }
+
+    /// Bytes of a decoded coefficient.
+    pub(crate) fn coefficient_size(&self) -> usize {
+        self.metadata().windows.iter().map(Window::coefficient_size).max().unwrap_or(0)
+    }
+
     /// Bytes of memory to read and refine the largest block: payload, codes, coefficients, the mask of missing samples,
     /// and exactly stored samples.
     pub fn block_bytes(&self) -> usize {
         let payload = 5;
-        let coefficient = self.metadata().windows.iter().map(Window::coefficient_size).max().unwrap_or(0);
-        let refined = payload + size_of::<i32>() + coefficient;
+        let refined = payload + size_of::<i32>() + self.coefficient_size();
         self.largest_block() * (refined + 1 + self.sample().size()) + self.bytes_to_begin(refined)
     }
 

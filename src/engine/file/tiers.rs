@@ -1,10 +1,7 @@
 //! Blocks of files with tiers: they begin with the decoded nodes of the block above.
 
-use super::above::{
-    AboveKey, PlaceAbove, bytes_above, bytes_of_all_above, most_within, nodes_above, with_blocks_above,
-};
+use super::above::{AboveKey, PlaceAbove, bytes_above, bytes_of_all_above, most_within, with_blocks_above};
 use super::coefficient_file::CoefficientFile;
-use super::detail;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -14,7 +11,7 @@ use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::{Above, Field};
 use wavesplat_format::limits::BLOCKS_PER_LEAF;
-use wavesplat_format::{Axis, BlockEntry, BlockId, LeafEntry, Window};
+use wavesplat_format::{Axis, BlockEntry, BlockId, LeafEntry};
 
 impl CoefficientFile {
     /// The nodes of the block above with which a block begins at the codec's level of detail. None without tiers above.
@@ -100,7 +97,7 @@ impl CoefficientFile {
         self.above.limit(memory, bytes_above(self.metadata()));
     }
 
-    /// Bytes of the decoded blocks above others within their share of a memory budget.
+    /// An upper bound of the bytes of the decoded blocks above others within their share of a memory budget.
     pub fn shared_bytes(&self, memory: usize) -> usize {
         let each = bytes_above(self.metadata());
         (most_within(memory, each) * each).min(bytes_of_all_above(self.metadata()))
@@ -126,22 +123,7 @@ impl CoefficientFile {
     /// The coefficients of the largest block above others; 0 without tiers.
     pub(crate) fn largest_block_above(&self) -> usize {
         let m = self.metadata();
-        if bytes_above(m) > 0 { nodes_above(detail::whole(m).1) * self.most_coefficients() } else { 0 }
-    }
-
-    /// The codes of the largest block, ghost nodes included, whatever the level of detail.
-    pub(crate) fn most_codes(&self) -> usize {
-        nodes_above(detail::whole(self.metadata()).1) * self.most_coefficients()
-    }
-
-    /// The most coefficients of a voxel.
-    pub(crate) fn most_coefficients(&self) -> usize {
-        self.metadata().windows.iter().map(|window| window.coefficients as usize).max().unwrap_or(0)
-    }
-
-    /// Bytes of a decoded coefficient.
-    pub(crate) fn coefficient_size(&self) -> usize {
-        self.metadata().windows.iter().map(Window::coefficient_size).max().unwrap_or(0)
+        if bytes_above(m) > 0 { self.most_codes() } else { 0 }
     }
 
     /// An upper bound of the coefficients that blocks of tier 0 begin with.

@@ -31,7 +31,7 @@
 //! ```text
 //! for each group of views                      projection/plan: as many as fit in memory
 //!   for each batch of frames of a window       batches/driver: as many as fit; the scene selects its blocks
-//!     for each band of rows
+//!     for each band of pixels
 //!       for each run of blocks                 scene: read, decode                          (workers)
 //!         add it to every plane of every view  splat: values -> cells or tiles              (one owner each)
 //!       every tile inverts its pixels          reconstruct: planes -> frames, then / weights; certificate

@@ -36,8 +36,9 @@ impl ViewGroup<'_> {
         let blocks = self.visible_blocks(batch, report);
         let mut left = vec![TileRect::whole(budget.size())];
         while let Some(rect) = left.pop() {
-            left.extend(budget.split(&layout, &rect).into_iter().rev());
-            let Some(rect) = left.pop() else { break };
+            let mut parts = budget.split(&layout, &rect).into_iter();
+            let Some(rect) = parts.next() else { break };
+            left.extend(parts.rev());
             let plan = budget.plan(&layout, rect);
             let mut bands: Vec<_> = self
                 .weights

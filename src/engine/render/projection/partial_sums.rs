@@ -108,6 +108,7 @@ impl Projection {
             let mut clock = Instant::now();
             let weights = budget.setups().iter().map(|setup| splat_part_weights(setup, &budget));
             let group = ViewGroup { weights: weights.collect::<Result<_>>()?, budget: &budget, progress: *progress };
+            report.planned_bytes = report.planned_bytes.max(budget.planned_for_ones() as u64);
             lap(&mut clock, &mut report.weight_seconds);
             for (view, weights) in group.weights.iter().enumerate() {
                 sink(PartialSums::Weights { view: first + view, sums: &weights.sums })?;

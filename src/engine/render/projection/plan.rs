@@ -81,7 +81,7 @@ impl<'a> Budget<'a> {
             let setups = std::slice::from_ref(setup);
             let budget = Budget::new(config, kept, scene, setups);
             let bands = budget.bytes(1, budget.all_double(planes), budget.smallest(), 1);
-            let alone = fixed(config, setups) + bands.max(budget.ones_bytes());
+            let alone = fixed(config, setups) + bands.max(budget.bytes_while_ones());
             memory::least(|memory| alone + scene.shared_bytes(memory))
         };
         setups.iter().map(least).max().unwrap_or(0)
@@ -161,7 +161,7 @@ impl<'a> Budget<'a> {
     }
 
     /// Bytes to splat ones, in addition to those that are kept of them.
-    fn ones_bytes(&self) -> usize {
+    fn bytes_while_ones(&self) -> usize {
         let of_view = |setup: &ViewSetup| {
             let (backend, threads) = (&setup.backend, rayon::current_num_threads());
             let numbers = threads * (backend.scratch(&self.block, 1) + backend.kept(&self.block) + self.block.voxels());
@@ -172,7 +172,7 @@ impl<'a> Budget<'a> {
 
     /// Bytes that splatting ones takes, with all that does not depend on bands.
     pub(super) fn planned_for_ones(&self) -> usize {
-        self.fixed + self.ones_bytes()
+        self.fixed + self.bytes_while_ones()
     }
 
     /// The size of the smallest band.
@@ -202,24 +202,24 @@ impl<'a> Budget<'a> {
         let threads = rayon::current_num_threads();
         // A thread may begin a plane in f64 in each view before it sees that there is no room; and it filters one.
         let more = threads * self.setups.len();
-        let doubles = planes.doubles * self.double_bytes(size) + more * self.begun_bytes(size);
+        let doubles = planes.doubles * self.double_bytes(size) + more * self.plane_bytes(size);
         bands + doubles + threads * scratch * size_of::<f64>()
     }
 
     /// Bytes of a plane in f64 of a band of `size` pixels, in the view where it takes most.
-    fn begun_bytes(&self, size: [usize; 2]) -> usize {
+    fn plane_bytes(&self, size: [usize; 2]) -> usize {
         self.setups.iter().map(|setup| setup.backend.double_bytes(size)).max().unwrap_or(0)
     }
 
-    /// The same, with what all threads copy of it to gather tiles.
+    /// Bytes of such a plane with what all threads copy of it to gather tiles.
     fn double_bytes(&self, size: [usize; 2]) -> usize {
         let copied = self.setups.iter().map(|setup| setup.backend.copied_bytes()).max().unwrap_or(0);
-        self.begun_bytes(size) + rayon::current_num_threads() * copied
+        self.plane_bytes(size) + rayon::current_num_threads() * copied
     }
 
     /// How many of `most` frames to render together.
     pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
-        let size = self.size.map(|n| n.min(PREFERRED));
+        let size = self.size.map(|n| n.min(PREFERRED_SIDE));
         let fits = |f: &usize| self.fits(*f, self.planes(scene.most_planes(*f, config)), size);
         (1..=most).rev().find(fits).unwrap_or(1)
     }
@@ -284,7 +284,7 @@ impl<'a> Budget<'a> {
 }
 
 /// The preferred least width and height of a band: a block that reaches over a band's edge is decoded for both bands.
-const PREFERRED: usize = 128;
+const PREFERRED_SIDE: usize = 128;
 
 /// Bytes that do not depend on how the work is divided, weights included.
 fn fixed(config: &RenderConfig, setups: &[ViewSetup]) -> usize {

@@ -18,7 +18,6 @@ use crate::render::report::LeftOut;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
-use wavesplat_core::base::memory::MOST_BLOCKS;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{magnitude, rounding};
 use wavesplat_core::wavelet::Lane;
@@ -327,7 +326,7 @@ impl FrameBatch for CoefficientBatch<'_> {
             prefetch.finish()?;
         }
         let BatchPlan { codec, wanted, .. } = &self.plan;
-        if codec.tiers() == 0 || blocks.len() > MOST_BLOCKS {
+        if codec.tiers() == 0 || blocks.len() > rayon::current_num_threads() {
             return Ok(()); // some of them are asked for next
         }
         let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;

@@ -48,7 +48,7 @@ struct WindowKind {
 /// Bytes of a stored code: its place and value, and what it is unpacked from.
 const CODE_BYTES: usize = 14;
 /// Bytes of an outlier or a missing sample: its place and value, and the corrections that it becomes, in vectors that grow.
-const OUTLIER_BYTES: usize = 128;
+const OUTLIER_BYTES: usize = 144;
 
 impl FileNeeds {
     pub(super) fn new(file: &CoefficientFile, what: SplatSource) -> Self {
@@ -60,15 +60,16 @@ impl FileNeeds {
         Self { windows, what, block }
     }
 
-    /// Bytes of a decoded block for a batch of `frames` frames. Windows are asked for `asked` frames each.
+    /// Bytes of a decoded block for a batch of `frames` frames. `asked` has the number of requested frames of each window.
     pub(super) fn block_bytes(&self, frames: usize, asked: impl Iterator<Item = usize>, is_projection: bool) -> usize {
         let BlockNeeds { read, above, whole, one, always_whole, samples, values, coefficients } = self.block;
         if self.what == SplatSource::Samples {
             return above.max(read + whole + samples);
         }
         let coded = if always_whole || !is_projection { whole } else { one };
-        let few = asked.filter(|asked| is_projection && are_few(*asked, coefficients)).max();
-        above.max(read + coded + values * if is_projection { few.unwrap_or(0) } else { frames })
+        let few = |asked: &usize| are_few(*asked, coefficients);
+        let frames = if is_projection { asked.filter(few).max().unwrap_or(0) } else { frames };
+        above.max(read + coded + values * frames)
     }
 
     /// The largest number of planes of a projection of `frames` frames.
@@ -118,7 +119,7 @@ impl BlockNeeds {
         let refined = |coefficients: usize| (coefficients + plane).max(coefficients * 3 / 2) * coefficient;
         Self {
             read: codes + exact + outliers * OUTLIER_BYTES + mask + file.known_bytes(),
-            above: file.largest_block_above() * CODE_BYTES + refined(file.largest_block_above()),
+            above: file.largest_block_above() * CODE_BYTES + refined(file.largest_block_above()) + file.known_bytes(),
             whole: refined(largest),
             one: refined(plane),
             always_whole: outliers > 0 || windows.iter().any(refines_time),

@@ -5,7 +5,7 @@ use super::view_setup::ViewSetup;
 use crate::render::batches::{BlockAdder, BlockReader, ReadStats};
 use wavesplat_core::base::error::Result;
 
-/// A band of a view's picture: some rows, or a part of their columns.
+/// A band of a view's picture: a rectangle of its pixels.
 #[derive(Clone)]
 pub(super) struct Band<'a> {
     pub(super) setup: &'a ViewSetup,

@@ -41,17 +41,17 @@ impl<'a> Bundles<'a> {
     /// The bundles for the cells in `tile`. The ones are the filtered cells of the value 1 at all voxels.
     pub(super) fn new(cells: &'a FilteredCells, tile: &Window, ones: Option<&FilteredCells>) -> Self {
         let ones = ones.filter(|_| !cells.doubles.is_empty()).map(|ones| ones_in(ones, tile));
-        let (apart, precise) = match &ones {
-            Some(ones) => (apart(cells, tile, |number, sums| ApartPlane::less_mean(number, sums, ones)), Vec::new()),
-            None => (Vec::new(), apart(cells, tile, ApartPlane::as_it_is)),
+        let (relative, precise) = match &ones {
+            Some(ones) => (own_planes(cells, tile, |n, sums| OwnPlane::less_mean(n, sums, ones)), Vec::new()),
+            None => (Vec::new(), own_planes(cells, tile, OwnPlane::as_it_is)),
         };
-        let numbers = apart.iter().map(|plane| plane.stored.number);
+        let numbers = relative.iter().map(|plane| plane.stored.number);
         let numbers: Vec<usize> = numbers.chain(precise.iter().map(|plane| plane.stored.number)).collect();
-        let is_apart = |number: usize| numbers.contains(&number);
-        let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, is_apart));
+        let has_own = |number: usize| numbers.contains(&number);
+        let single = cells.groups.iter().filter_map(|group| of_group(cells, group, tile, has_own));
         let double = cells.double_groups.iter().filter_map(|group| of_group(cells, group, tile, |_| false));
         Self {
-            single: single.chain(side_by_side(&apart, tile)).collect(),
+            single: single.chain(side_by_side(&relative, tile)).collect(),
             double: double.chain(side_by_side(&precise, tile)).collect(),
         }
     }
@@ -69,11 +69,11 @@ fn of_group<'a, R: Real>(
     cells: &'a FilteredCells,
     group: &'a Group<R>,
     tile: &Window,
-    is_apart: impl Fn(usize) -> bool,
+    has_own: impl Fn(usize) -> bool,
 ) -> Option<Bundle<'a, R>> {
     let [(columns, _), (rows, _)] = cells.window.part_in(tile);
     let numbered = group.planes.iter().copied().enumerate();
-    let touched = numbered.filter(|(place, n)| !is_apart(*n) && group.has_sums(*place, &columns, &rows));
+    let touched = numbered.filter(|(place, n)| !has_own(*n) && group.has_sums(*place, &columns, &rows));
     let planes: Vec<_> = touched.map(|(place, number)| (place, TilePlane { number, mean: 0.0, scale: 1.0 })).collect();
     let is_empty = columns.is_empty() || planes.is_empty();
     let Group { places, stride, .. } = *group;
@@ -82,18 +82,18 @@ fn of_group<'a, R: Real>(
 }
 
 /// A plane with sums in f64 in the tile.
-struct ApartPlane<R> {
+struct OwnPlane<R> {
     stored: TilePlane,
     /// What is stored of all its sums at the cells of the tile, row by row.
     numbers: Vec<R>,
 }
 
 /// The planes with sums in f64 that are not zero in the tile. `store(number, sums)` takes all sums of a plane.
-fn apart<R>(
+fn own_planes<R>(
     cells: &FilteredCells,
     tile: &Window,
-    store: impl Fn(usize, &[f64]) -> ApartPlane<R>,
-) -> Vec<ApartPlane<R>> {
+    store: impl Fn(usize, &[f64]) -> OwnPlane<R>,
+) -> Vec<OwnPlane<R>> {
     let (mut sums, mut planes) = (Vec::new(), Vec::new());
     for (number, double) in &cells.doubles {
         if sum_plane(cells, *number, double, tile, &mut sums) {
@@ -121,7 +121,7 @@ fn sum_plane(cells: &FilteredCells, number: usize, double: &[f64], tile: &Window
     true
 }
 
-impl ApartPlane<f32> {
+impl OwnPlane<f32> {
     /// The plane less its mean over the tile, where the value 1 at all voxels has the sums `ones`.
     fn less_mean(number: usize, sums: &[f64], ones: &[f64]) -> Self {
         let most = sums.iter().fold(0.0_f64, |most, sum| most.max(sum.abs()));
@@ -133,7 +133,7 @@ impl ApartPlane<f32> {
     }
 }
 
-impl ApartPlane<f64> {
+impl OwnPlane<f64> {
     fn as_it_is(number: usize, sums: &[f64]) -> Self {
         Self { stored: TilePlane { number, mean: 0.0, scale: 1.0 }, numbers: sums.to_vec() }
     }
@@ -163,8 +163,8 @@ fn ones_in(ones: &FilteredCells, tile: &Window) -> Vec<f64> {
 }
 
 /// A tile's own cells.
-fn side_by_side<'a, R: Real>(planes: &[ApartPlane<R>], tile: &Window) -> Vec<Bundle<'a, R>> {
-    let bundle = |planes: &[ApartPlane<R>]| {
+fn side_by_side<'a, R: Real>(planes: &[OwnPlane<R>], tile: &Window) -> Vec<Bundle<'a, R>> {
+    let bundle = |planes: &[OwnPlane<R>]| {
         let places = places(planes.len());
         let mut cells = vec![R::default(); tile.size[0] * tile.size[1] * places];
         for (place, plane) in planes.iter().enumerate() {
