@@ -68,6 +68,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
             "engine/render/page/block.rs",
             "engine/render/projection/plan.rs",
             "engine/render/projection/weight_sums.rs",
+            "engine/render/scenes/coefficients.rs",
             "engine/render/scenes/overview.rs",
             "jobs/extract/mod.rs",
             "cli/common.rs",
