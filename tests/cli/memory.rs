@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 
 use super::{Work, all_but_options};
+use crate::common::random::Random;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
@@ -53,12 +54,9 @@ fn archives_much_larger_than_the_budget_stay_within_it() {
 
 /// An archive of noise in 80^3 voxels and 16 frames: every code takes its place.
 fn write_noise(work: &Work, name: &str) {
-    let mut state = 1_u64;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1 << 24) as f32
-    };
-    work.write(name, (0..80 * 80 * 80 * 16).flat_map(|_| next().to_le_bytes()).collect::<Vec<u8>>());
+    let mut random = Random(1);
+    let samples = (0..80 * 80 * 80 * 16).flat_map(|_| (random.unit() as f32).to_le_bytes());
+    work.write(name, samples.collect::<Vec<u8>>());
 }
 
 /// Renders within the planned memory, and returns the share of it that was used.

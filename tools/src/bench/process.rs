@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use wavesplat::base::error::{Error, Result};
+use wavesplat_core::base::memory;
 
 /// A measurement that runs in its own process.
 pub(super) trait ProcessTask: Serialize + DeserializeOwned {
@@ -44,25 +45,6 @@ pub(super) fn answer<T: ProcessTask>(text: &str) -> Result<String> {
     let wrong = |e: serde_json::Error| Error::usage(format!("bench-step: {e}"));
     let task: T = serde_json::from_str(text).map_err(wrong)?;
     let measured = task.measure()?;
-    serde_json::to_string(&Outcome { measured, peak_bytes: peak_bytes() }).map_err(wrong)
-}
-
-/// The peak memory of this process so far, if the system reports it.
-fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kib| kib << 10)
-}
-
-#[cfg(test)]
-mod tests {
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn the_peak_is_known_and_never_falls() {
-        let before = super::peak_bytes().expect("Linux tells");
-        let large = std::hint::black_box(vec![1_u8; 64 << 20]);
-        drop(large);
-        let after = super::peak_bytes().expect("Linux tells");
-        assert!(before > 1 << 16 && after >= before.max(64 << 20));
-    }
+    serde_json::to_string(&Outcome { measured, peak_bytes: memory::peak_with_files().map(|bytes| bytes as u64) })
+        .map_err(wrong)
 }

@@ -69,9 +69,9 @@ impl ViewGroup<'_> {
         let selected = blocks.len();
         blocks.retain(|b| self.weights.iter().any(|view| view.setup.reaches(*b, &whole)));
         let reached = blocks.len();
+        blocks.retain(|b| self.weights.iter().any(|view| view.setup.sees(*b)));
         // Those that share blocks above follow each other.
         self.weights[0].setup.blocks.sort_nested(&mut blocks);
-        blocks.retain(|b| self.weights.iter().any(|view| view.setup.sees(*b)));
         report.blocks_outside += (selected - reached) as u64;
         report.blocks_dimmed += (reached - blocks.len()) as u64;
         blocks

@@ -327,7 +327,7 @@ impl FrameBatch for CoefficientBatch<'_> {
         }
         let BatchPlan { codec, wanted, .. } = &self.plan;
         if codec.tiers() == 0 || blocks.len() > rayon::current_num_threads() {
-            return Ok(()); // some of them are asked for next
+            return Ok(()); // a plan has room for few blocks above at a time
         }
         let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;
         let decoded_now = next.iter().filter(|entry| !self.file.keeps_coefficients(codec, entry, &wanted.coefficients));
