@@ -1,8 +1,9 @@
 //! The samples of a block and of the neighbouring voxels that predict them.
 
 use super::WindowCodec;
+use super::buffer::Buffer;
 use crate::base::sample;
-use std::borrow::Cow;
+use std::ops::Deref;
 
 /// A block, and the voxels whose samples are known.
 #[derive(Debug, Clone, Copy)]
@@ -11,6 +12,23 @@ pub struct BlockWithGhosts {
     pub size: [usize; 3],
     /// Voxels with samples: the block's own, and possibly one more along each of x, y, z.
     pub known: [usize; 3],
+}
+
+/// Samples of a caller, or a copy of some.
+pub(super) enum Samples<'a> {
+    Lent(&'a [u8]),
+    Own(Buffer<u8>),
+}
+
+impl Deref for Samples<'_> {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Lent(samples) => samples,
+            Self::Own(samples) => samples,
+        }
+    }
 }
 
 impl From<[usize; 3]> for BlockWithGhosts {
@@ -22,70 +40,90 @@ impl From<[usize; 3]> for BlockWithGhosts {
 
 impl BlockWithGhosts {
     /// The samples of the block alone, frame by frame.
-    pub(super) fn own<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Cow<'a, [u8]> {
-        let (each, [x, y, z]) = (codec.sample.size(), self.size);
-        if self.known == self.size {
-            return Cow::Borrowed(samples);
+    pub(super) fn own<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Samples<'a> {
+        match self.known == self.size {
+            true => Samples::Lent(samples),
+            false => Samples::Own(copied(codec, samples, self.size, self.known, self.size)),
         }
-        let row = |t: usize, z: usize, y: usize| each * self.known[0] * (y + self.known[1] * (z + self.known[2] * t));
-        let mut own = Vec::with_capacity(codec.frames() * x * y * z * each);
-        for (t, z, y) in rows(codec.frames(), [y, z]) {
-            own.extend_from_slice(&samples[row(t, z, y)..][..x * each]);
-        }
-        Cow::Owned(own)
     }
 
     /// The samples of `outer` voxels along x, y, z, at least as many as are known. Beyond the known voxels, the last
     /// two planes are extrapolated linearly.
-    pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> Cow<'a, [u8]> {
+    pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> Samples<'a> {
+        if self.known == outer {
+            return Samples::Lent(samples);
+        }
         let mut known = self.known;
-        let mut extended = Cow::Borrowed(samples);
+        let mut extended = copied(codec, samples, known, known, outer);
         for axis in 0..3 {
             if known[axis] < outer[axis] {
-                extended = Cow::Owned(continued(codec, &extended, known, axis, known[axis]));
+                extrapolate(codec, &mut extended, outer, known, axis, known[axis]);
                 known[axis] += 1;
             }
         }
-        extended
+        Samples::Own(extended)
     }
 
     /// The nodes of a block of a tier above 0, from what is known: those in the volume and, along axes that have a node behind it,
     /// the volume's last two planes of voxels. Those are extrapolated as for the blocks below.
-    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Cow<'a, [u8]> {
+    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Samples<'a> {
+        if self.known == self.size {
+            return Samples::Lent(samples);
+        }
         let mut known = self.known;
-        let mut nodes = Cow::Borrowed(samples);
+        let mut nodes = Buffer::from(samples);
         for axis in 0..3 {
             if known[axis] > self.size[axis] {
-                nodes = Cow::Owned(continued(codec, &nodes, known, axis, known[axis] - 2));
+                extrapolate(codec, &mut nodes, self.known, known, axis, known[axis] - 2);
                 known[axis] -= 1;
             }
         }
-        nodes
+        Samples::Own(copied(codec, &nodes, self.size, self.known, self.size))
     }
 }
 
-/// Extrapolates one more plane of samples along an axis: twice the last plane minus the one before it. Where one of the
-/// two samples is missing, it repeats the last. Keeps the first planes before it.
-fn continued(codec: &WindowCodec, samples: &[u8], known: [usize; 3], axis: usize, kept: usize) -> Vec<u8> {
+/// The samples of `size` voxels, frame by frame, from an array of `from` voxels in one of `to` voxels. The others are arbitrary.
+fn copied(codec: &WindowCodec, samples: &[u8], size: [usize; 3], from: [usize; 3], to: [usize; 3]) -> Buffer<u8> {
+    let each = codec.sample.size();
+    let row = |of: [usize; 3], t: usize, z: usize, y: usize| each * of[0] * (y + of[1] * (z + of[2] * t));
+    let mut out = Buffer::with_len(codec.frames() * to.iter().product::<usize>() * each);
+    for (t, z, y) in rows(codec.frames(), [size[1], size[2]]) {
+        let samples = &samples[row(from, t, z, y)..][..size[0] * each];
+        out[row(to, t, z, y)..][..samples.len()].copy_from_slice(samples);
+    }
+    out
+}
+
+/// Extrapolates a plane of samples across an axis: twice the last of the known planes minus the one before it. Where one of the
+/// two samples is missing, it repeats the last. Writes the result as plane `to`. `samples` are an array of `size` voxels for each frame.
+fn extrapolate(codec: &WindowCodec, samples: &mut [u8], size: [usize; 3], known: [usize; 3], axis: usize, to: usize) {
     let (ty, each) = (codec.sample, codec.sample.size());
-    let inner: usize = known[..axis].iter().product();
-    let (plane, n) = (inner * each, known[axis]);
-    let (mut last, mut before) = (vec![0.0; inner], vec![0.0; inner]);
-    let mut out = Vec::with_capacity(samples.len() / n * (n + 1));
-    for part in samples.chunks_exact(plane * n) {
-        out.extend_from_slice(&part[..plane * kept]);
-        sample::load(ty, &part[plane * (n - 1)..], &mut last);
-        sample::load(ty, &part[plane * n.saturating_sub(2)..][..plane], &mut before);
+    let pitch = [1, size[0], size[0] * size[1]];
+    let (run, [inner, outer]) = match axis {
+        0 => (1, [1, 2]),
+        1 => (known[0], [0, 2]),
+        _ => (known[0], [0, 1]),
+    };
+    let of_row = |row: usize| (0..known[inner]).step_by(run).map(move |n| n * pitch[inner] + row * pitch[outer]);
+    let runs: Vec<usize> = (0..known[outer]).flat_map(of_row).collect();
+    let plane = |n: usize| runs.iter().map(move |first| each * (first + n * pitch[axis]));
+    let mut bytes = vec![0; runs.len() * run * each];
+    let [mut last, mut before] = [0; 2].map(|_| vec![0.0; runs.len() * run]);
+    for frame in samples.chunks_exact_mut(each * size.iter().product::<usize>()) {
+        for (values, n) in [(&mut last, known[axis] - 1), (&mut before, known[axis].saturating_sub(2))] {
+            let copies = bytes.chunks_exact_mut(run * each).zip(plane(n));
+            copies.for_each(|(bytes, at)| bytes.copy_from_slice(&frame[at..][..run * each]));
+            sample::load(ty, &bytes, values);
+        }
         for (last, before) in last.iter_mut().zip(&before) {
             if !codec.is_missing(*last) && !codec.is_missing(*before) {
                 *last = 2.0 * *last - before;
             }
         }
-        let at = out.len();
-        out.resize(at + plane, 0);
-        sample::store(ty, &last, &mut out[at..]);
+        sample::store(ty, &last, &mut bytes);
+        let copies = bytes.chunks_exact(run * each).zip(plane(to));
+        copies.for_each(|(bytes, at)| frame[at..][..run * each].copy_from_slice(bytes));
     }
-    out
 }
 
 /// The numbers (t, z, y) of rows.

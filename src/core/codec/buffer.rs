@@ -1,5 +1,6 @@
 //! Large buffers that are reused: fresh memory from the system costs about as much as decoding a block into it.
 
+use crate::base::zeroed::{Pod, Zeroed};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
@@ -9,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Debug, Default)]
 pub struct Buffer<T: Pooled> {
     /// At least `len` values; the rest has been used before.
-    values: Vec<T>,
+    values: Zeroed<T>,
     len: usize,
 }
 
@@ -22,7 +23,13 @@ impl<T: Pooled> Buffer<T> {
             (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len())).min_by_key(|n| spare[*n].len());
         let values = fits.map(|n| spare.swap_remove(n));
         drop(spare);
-        Self { values: values.unwrap_or_else(|| vec![T::default(); len]), len }
+        Self { values: values.unwrap_or_else(|| Zeroed::new(len)), len }
+    }
+
+    /// Gives the memory back, and takes some for `len` entries with arbitrary values.
+    pub fn renew(&mut self, len: usize) {
+        *self = Self::default();
+        *self = Self::with_len(len);
     }
 }
 
@@ -62,7 +69,7 @@ impl<T: Pooled> DerefMut for Buffer<T> {
     }
 }
 
-fn spare<T: Pooled>() -> std::sync::MutexGuard<'static, Vec<Vec<T>>> {
+fn spare<T: Pooled>() -> std::sync::MutexGuard<'static, Vec<Zeroed<T>>> {
     T::spare().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -73,9 +80,9 @@ pub(super) fn clear<T>(buffer: &mut Vec<T>) -> &mut Vec<T> {
 }
 
 /// A type that buffers can hold.
-pub trait Pooled: Copy + Default + 'static {
+pub trait Pooled: Pod + Default {
     /// The unused buffers.
-    fn spare() -> &'static Mutex<Vec<Vec<Self>>>;
+    fn spare() -> &'static Mutex<Vec<Zeroed<Self>>>;
 }
 
 /// Returns the memory of all unused buffers to the system.
@@ -92,8 +99,8 @@ pub fn release_spare() {
 macro_rules! pooled {
     ($($t:ty),*) => {
         $(impl Pooled for $t {
-            fn spare() -> &'static Mutex<Vec<Vec<Self>>> {
-                static SPARE: Mutex<Vec<Vec<$t>>> = Mutex::new(Vec::new());
+            fn spare() -> &'static Mutex<Vec<Zeroed<Self>>> {
+                static SPARE: Mutex<Vec<Zeroed<$t>>> = Mutex::new(Vec::new());
                 &SPARE
             }
         })*

@@ -12,7 +12,7 @@
 //! samples are stored without loss: a mask, and their own bytes.
 
 use super::block_with_ghosts::BlockWithGhosts;
-use super::buffer::clear;
+use super::buffer::{Buffer, clear};
 use super::check::Tally;
 use super::codes::Codes;
 use super::error_weights::QuantizerSetup;
@@ -30,10 +30,7 @@ use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 #[derive(Debug)]
 pub struct Encoder {
     compressor: Compressor,
-    codes: Vec<i32>,
-    /// The coefficients that a pyramid refines, in either precision, and scratch.
-    single: [Vec<f32>; 3],
-    double: [Vec<f64>; 3],
+    codes: Buffer<i32>,
     raw: Vec<u8>,
 }
 
@@ -49,8 +46,7 @@ pub struct Encoded {
 impl Encoder {
     /// Creates an encoder with a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
-        let (codes, raw, single, double) = Default::default();
-        Ok(Self { compressor: Compressor::new(level)?, codes, single, double, raw })
+        Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new() })
     }
 
     /// Encodes a block of some voxels. `samples` are little-endian, frame by frame; `above` is the block above, if there are tiers.
@@ -74,12 +70,12 @@ impl Encoder {
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
-                self.double = Default::default(); // an earlier window may have used it
-                block.refine(pyramid, size, &outer, above.map(Above::singles), &mut self.single, &mut self.codes)
+                let (known, field) = (above.map(Above::singles), &mut Buffer::default());
+                block.refine(pyramid, size, &outer, known, field, &mut self.codes)
             }
             Some(pyramid) => {
-                self.single = Default::default();
-                block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut self.double, &mut self.codes)
+                let (known, field) = (above.map(Above::doubles), &mut Buffer::default());
+                block.refine(pyramid, size, &outer, known, field, &mut self.codes)
             }
         };
         let coded = match coded {
@@ -88,7 +84,7 @@ impl Encoder {
         };
         let Parts { stats, share, mut parts } = self.smaller(codec, size, samples, &missing, coded)?;
         if missing.count > 0 {
-            pack_missing(&missing.mask, &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
+            pack_missing(missing.mask(), &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
             parts.sort_by_key(|part| part.kind); // exact parts come after it
@@ -111,21 +107,14 @@ impl Encoder {
         let missing = Missing::find(codec, &samples);
         let source = Source { codec, size: of.size, samples: &samples, missing: &missing };
         let Some(pyramid) = &codec.scheme.pyramid else { return Ok(self.uncoded(codec, id, size, above)) };
+        let (mut single, mut double) = (Buffer::default(), Buffer::default());
         let coded = match pyramid.single {
-            true => {
-                let known = above.map(Above::singles);
-                self.double = Default::default(); // an earlier window may have used it
-                source.refine(pyramid, size, &source, known, &mut self.single, &mut self.codes)
-            }
-            false => {
-                let known = above.map(Above::doubles);
-                self.single = Default::default();
-                source.refine(pyramid, size, &source, known, &mut self.double, &mut self.codes)
-            }
+            true => source.refine(pyramid, size, &source, above.map(Above::singles), &mut single, &mut self.codes),
+            false => source.refine(pyramid, size, &source, above.map(Above::doubles), &mut double, &mut self.codes),
         };
         let Some(coded) = coded else { return Ok(self.uncoded(codec, id, size, above)) };
-        let single = pyramid.single.then_some(&self.single[1][..]);
-        let field = Field::coarse(single, &self.double[1], codec.basis.coefficients());
+        let ks = codec.basis.coefficients();
+        let field = if pyramid.single { Field::single(single, ks) } else { Field::double(double, ks) };
         let Parts { stats, parts, .. } = self.coded_parts(codec, size, &coded)?;
         Ok((EncodedBlock { id, stats, parts }, field))
     }
@@ -150,7 +139,7 @@ impl Encoder {
         let voxels = block.voxels();
         let weighing = QuantizerSetup::new(codec, samples, missing.magnitude)?;
         let step = weighing.step;
-        clear(&mut self.codes).resize(codec.basis.coefficients() * voxels, 0);
+        self.codes.renew(codec.basis.coefficients() * voxels);
         let mut group = Group::new(codec);
         let (mut dropped, mut tally) = (0.0, Tally::new());
         for (first, count) in lane_groups(voxels) {
@@ -220,14 +209,14 @@ impl Encoder {
     ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::new();
         sample::for_each_run(codec.sample, samples, |first, values| {
-            let present = values.iter().zip(&missing.mask[first..]).filter(|(_, missing)| !**missing);
-            present.for_each(|(value, _)| tally.add(*value, 0.0));
+            let present = (first..).zip(values).filter(|(sample, _)| !missing.is(*sample));
+            present.for_each(|(_, value)| tally.add(*value, 0.0));
         });
         let size = codec.sample.size();
         clear(&mut self.raw);
         let kind = match listed {
             Some(listed) => {
-                listed.pack(&mut self.codes, &mut self.raw);
+                listed.pack(&mut Vec::new(), &mut self.raw);
                 PartKind::Listed
             }
             None => {

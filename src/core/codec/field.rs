@@ -172,13 +172,14 @@ impl Field<'static> {
         Ok(Self::refined(codec, size, block.stats.step, &codes.unwrap_or_else(PooledCodes::new), above, &all))
     }
 
-    /// The decoded nodes of a block of a tier above 0, as its encoder has them.
-    pub(super) fn coarse(single: Option<&[f32]>, double: &[f64], ks: usize) -> Self {
-        let values = match single {
-            Some(values) => Values::Single(values.into()),
-            None => Values::Double(double.into()),
-        };
-        Self { values, marked: vec![true; ks] }
+    /// The decoded nodes of a block, as its encoder has them, of `ks` coefficients a series.
+    pub(super) fn single(nodes: Buffer<f32>, ks: usize) -> Self {
+        Self { values: Values::Single(nodes), marked: vec![true; ks] }
+    }
+
+    /// As [`Self::single`], in 64-bit floats.
+    pub(super) fn double(nodes: Buffer<f64>, ks: usize) -> Self {
+        Self { values: Values::Double(nodes), marked: vec![true; ks] }
     }
 }
 

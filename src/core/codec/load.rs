@@ -11,20 +11,34 @@ use crate::wavelet::{LANES, Lane};
 
 /// Which samples of a block are missing, and the largest of the others.
 pub(super) struct Missing {
-    pub(super) mask: Vec<bool>,
+    /// For each sample; empty if none is missing.
+    mask: Vec<bool>,
+    /// The number of samples.
+    pub(super) all: usize,
     pub(super) count: u64,
     pub(super) magnitude: f64,
 }
 
 impl Missing {
     pub(super) fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
-        let mut mask = vec![false; samples.len() / codec.sample.size()];
-        let mut count = 0;
+        let all = samples.len() / codec.sample.size();
+        let (mut mask, mut count) = (Vec::new(), 0);
         let (lo, hi) = sample::range_of_present(codec.sample, samples, codec.missing_value, |i| {
+            mask.resize(all, false);
             mask[i] = true;
             count += 1;
         });
-        Self { mask, count, magnitude: 0.0_f64.max(-lo).max(hi) }
+        Self { mask, all, count, magnitude: 0.0_f64.max(-lo).max(hi) }
+    }
+
+    /// Whether a sample is missing.
+    pub(super) fn is(&self, sample: usize) -> bool {
+        self.count > 0 && self.mask[sample]
+    }
+
+    /// Whether each sample is missing. Empty if none is.
+    pub(super) fn mask(&self) -> &[bool] {
+        &self.mask
     }
 
     /// The bytes of the missing samples, in order.
@@ -45,14 +59,14 @@ pub(super) fn load_group(
     count: usize,
     group: &mut Group,
 ) {
-    let voxels = missing.mask.len() / codec.frames();
+    let voxels = missing.all / codec.frames();
     load_lanes(codec, samples, first, count, voxels, &mut group.source);
     if let (Some(weight), 0, LANES) = (weighing.common(), missing.count, count) {
         return group.weight.fill([weight; LANES]);
     }
     for (frame, (source, weight)) in group.source.iter().zip(&mut group.weight).enumerate() {
         let (at, weights) = (frame * voxels + first, weighing.weights(source));
-        *weight = std::array::from_fn(|l| if l < count && !missing.mask[at + l] { weights[l] } else { 0.0 });
+        *weight = std::array::from_fn(|l| if l < count && !missing.is(at + l) { weights[l] } else { 0.0 });
     }
     if missing.count > 0 {
         (0..count).for_each(|lane| fill(&mut group.source, &group.weight, lane));

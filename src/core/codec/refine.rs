@@ -4,7 +4,7 @@
 //! The step is that of eq 25 times the scheme's coarseness, less a margin for rounding in 32-bit floats. With a
 //! coarseness above 1, rounding alone may miss the bound; samples that miss it are stored exactly.
 
-use super::buffer::clear;
+use super::buffer::{Buffer, clear};
 use super::check::{Compared, Tally};
 use super::codes::PooledCodes;
 use super::error_weights::QuantizerSetup;
@@ -69,7 +69,7 @@ impl Source<'_> {
     }
 
     /// Encodes the block, which covers `size` voxels, by a pyramid, from the samples of `outer`, which also has nodes that only
-    /// predict, and the known nodes. `codes` is the result; the fields are scratch. None if the block must be stored exactly, or,
+    /// predict, and the known nodes. The decoded nodes are left in `field`, and their codes in `codes`. None if the block must be stored exactly, or,
     /// above tier 0, without codes.
     ///
     /// The scheme's step suits most blocks. Where so many samples miss the bound that storing them exactly takes a large
@@ -80,27 +80,26 @@ impl Source<'_> {
         size: [usize; 3],
         outer: &Source<'_>,
         known: Option<Nodes<'_, R>>,
-        [source, field, split]: &mut [Vec<R>; 3],
-        codes: &mut Vec<i32>,
+        field: &mut Buffer<R>,
+        codes: &mut Buffer<i32>,
     ) -> Option<Coded> {
         let weighing = QuantizerSetup::new(self.codec, self.samples, self.missing.magnitude)?;
         let passes = self.codec.passes(pyramid, size);
-        codes.resize(passes.codes(), 0);
-        field.resize(passes.nodes().iter().product(), R::default());
+        codes.renew(passes.codes());
+        field.renew(passes.nodes().iter().product());
         if let Some(zero) = self.zero(&weighing, &passes, field) {
             return Some(zero);
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
-        outer.load(&weighing, source);
-        let nodes = Nodes { values: &*source, size: outer.size };
-        let mut encode = |step, field: &mut Vec<R>, codes: &mut Vec<i32>| {
-            passes.encode(step, nodes, known, field, split, codes).then_some(())
-        };
+        let source = outer.load(&weighing);
+        let nodes = Nodes { values: &source, size: outer.size };
+        let encode =
+            |step, field: &mut [R], codes: &mut [i32]| passes.encode(step, nodes, known, field, codes).then_some(());
         encode(step, field, codes)?;
         let check = |field: &[R], codes: &[i32]| self.checked(&weighing, &passes, known, field, codes);
         let mut checked = check(field, codes);
         let finest = step / self.codec.scheme.coarseness.max(1.0);
-        while checked.has_many_outliers(self.missing.mask.len()) && step > finest {
+        while checked.has_many_outliers(self.missing.all) && step > finest {
             let finer = (step / FINER).max(finest);
             let found = encode(finer, field, codes).map(|()| check(field, codes));
             let is_worse = |found: &Checked| found.tally.is_some() && checked.cost() <= found.cost();
@@ -173,20 +172,21 @@ impl Source<'_> {
     }
 
     /// Loads the nodes that the pyramid refines.
-    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup, field: &mut Vec<R>) {
-        field.resize(self.codec.basis.coefficients() * self.voxels(), R::default());
+    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup) -> Buffer<R> {
+        let mut field = Buffer::with_len(self.codec.basis.coefficients() * self.voxels());
         if self.plain() {
-            self.load_samples(field);
+            self.load_samples(&mut field);
         } else {
-            self.load_series(weighing, field);
+            self.load_series(weighing, &mut field);
         }
+        field
     }
 
     /// Loads the samples as nodes; missing samples become NaN.
     fn load_samples<R: Real>(&self, field: &mut [R]) {
         sample::load_as(self.codec.sample, self.samples, field, R::from_f64);
         if self.missing.count > 0 {
-            let missing = field.iter_mut().zip(&self.missing.mask).filter(|(_, missing)| **missing);
+            let missing = field.iter_mut().zip(self.missing.mask()).filter(|(_, missing)| **missing);
             missing.for_each(|(node, _)| *node = R::from_f64(f64::NAN));
         }
     }
@@ -299,12 +299,12 @@ impl Source<'_> {
 
     /// The index of a sample; none if it is missing.
     fn sample_index(&self, index: usize) -> Option<usize> {
-        (!self.missing.mask[index]).then_some(index)
+        (!self.missing.is(index)).then_some(index)
     }
 
     /// Whether storing the samples that miss the bound is cheaper than storing all samples exactly.
     pub(super) fn outliers_affordable(&self, outliers: usize) -> bool {
-        outliers <= self.missing.mask.len() / MOST_OUTLIERS
+        outliers <= self.missing.all / MOST_OUTLIERS
     }
 }
 

@@ -1,34 +1,26 @@
 //! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
 
 use super::WindowCodec;
-use super::block_with_ghosts::BlockWithGhosts;
+use super::block_with_ghosts::{BlockWithGhosts, Samples};
+use super::buffer::Buffer;
 use super::encode::listed;
 use super::error_weights::QuantizerSetup;
 use super::load::Missing;
 use super::pyramid::Nodes;
 use super::real::Real;
 use super::refine::Source;
-use std::borrow::Cow;
 use wavesplat_format::Pyramid;
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
-pub struct Trial<'a, R> {
+pub struct Trial<'a, R: Real> {
     size: [usize; 3],
-    samples: Cow<'a, [u8]>,
+    samples: Samples<'a>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
     /// The nodes of the box, and the nodes beyond it that may predict them.
-    nodes: Vec<R>,
+    nodes: Buffer<R>,
     /// The voxels of these nodes along x, y, z.
     outer: [usize; 3],
-}
-
-/// Scratch that trials reuse.
-#[derive(Default)]
-pub struct Scratch<R> {
-    field: Vec<R>,
-    split: Vec<R>,
-    codes: Vec<i32>,
 }
 
 impl<'a, R: Real> Trial<'a, R> {
@@ -39,10 +31,8 @@ impl<'a, R: Real> Trial<'a, R> {
         let around = Missing::find(codec, &extended);
         let missing = Missing::find(codec, &own);
         let weighing = QuantizerSetup::new(codec, &own, missing.magnitude);
-        let mut nodes = Vec::new();
-        if let Some(weighing) = &weighing {
-            Source { codec, size: outer, samples: &extended, missing: &around }.load(weighing, &mut nodes);
-        }
+        let extended = Source { codec, size: outer, samples: &extended, missing: &around };
+        let nodes = weighing.as_ref().map(|weighing| extended.load(weighing)).unwrap_or_default();
         Self { size, samples: own, missing, weighing, nodes, outer }
     }
 
@@ -53,35 +43,30 @@ impl<'a, R: Real> Trial<'a, R> {
 
     /// An estimate of the bytes of the box. Missing samples are left out, because they take the same bytes under every
     /// scheme.
-    pub fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid, scratch: &mut Scratch<R>) -> usize {
-        self.coded(codec, pyramid, scratch).unwrap_or(self.samples.len())
+    pub fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid) -> usize {
+        self.coded(codec, pyramid).unwrap_or(self.samples.len())
     }
 
     /// About the bytes of the box by its list of values; none if it may not be listed, or if that takes no less than `bytes`.
-    pub fn listed_bytes(&self, codec: &WindowCodec, bytes: usize, scratch: &mut Scratch<R>) -> Option<usize> {
+    pub fn listed_bytes(&self, codec: &WindowCodec, bytes: usize) -> Option<usize> {
         let listed = listed(codec, self.size, &self.samples, bytes)?;
-        Some(listed.estimate(&mut scratch.codes)).filter(|listed| *listed < bytes)
+        Some(listed.estimate(&mut Vec::new())).filter(|listed| *listed < bytes)
     }
 
     /// As [`Self::bytes`]; none if the box must be stored exactly.
-    fn coded(
-        &self,
-        codec: &WindowCodec,
-        pyramid: &Pyramid,
-        Scratch { field, split, codes }: &mut Scratch<R>,
-    ) -> Option<usize> {
+    fn coded(&self, codec: &WindowCodec, pyramid: &Pyramid) -> Option<usize> {
         let source = Source { codec, size: self.size, samples: &self.samples, missing: &self.missing };
         let weighing = self.weighing.as_ref()?;
         let step = source.step::<R>(pyramid, weighing)?;
         let passes = codec.passes(pyramid, self.size);
-        field.resize(passes.nodes().iter().product(), R::default());
-        codes.resize(passes.codes(), 0);
+        let mut field = Buffer::with_len(passes.nodes().iter().product());
+        let mut codes = Buffer::with_len(passes.codes());
         let nodes = Nodes { values: &self.nodes, size: self.outer };
-        if !passes.encode(step, nodes, None, field, split, codes) {
+        if !passes.encode(step, nodes, None, &mut field, &mut codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, field, &passes.marked_codes(codes));
-        let packed = |part| pyramid.packing.estimate(&passes.part_of(part, codes));
+        let outliers = source.estimate_outliers(weighing, &field, &passes.marked_codes(&codes));
+        let packed = |part| pyramid.packing.estimate(&passes.part_of(part, &codes));
         let packed: usize = (0..Pyramid::PARTS).map(packed).sum();
         // With too many outliers, all is stored exactly; the count still shows how near a better step is.
         let rest = if source.outliers_affordable(outliers) { packed } else { self.samples.len() };
@@ -138,7 +123,7 @@ mod tests {
             let encoded = encoder.block(&codec, id, SIZE, &samples, None).expect("a small block");
             let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
             let trial = Trial::<f32>::new(&codec, SIZE.into(), codec.outer_size(SIZE), &samples);
-            let estimate = trial.bytes(&codec, &pyramid, &mut Scratch::default());
+            let estimate = trial.bytes(&codec, &pyramid);
             assert!(estimate.abs_diff(stored) * 20 < stored, "{basis:?}: {estimate} for {stored}");
         }
     }

@@ -245,24 +245,23 @@ pub fn read_frames(
     region: &Region,
     ty: SampleType,
 ) -> Result<Vec<u8>> {
-    let mut samples = Vec::new();
-    read_frames_into(window, frames, region, ty, &mut samples)?;
+    let frame_bytes = region.voxels() * ty.size();
+    let mut samples = vec![0; frame_bytes * frames.len()];
+    read_frames_into(window, frames, region, &mut samples)?;
     Ok(samples)
 }
 
-/// As [`read_frames`], into `samples`, which it overwrites.
+/// As [`read_frames`], into all of `samples`, which are as long.
 pub fn read_frames_into(
     window: &dyn FrameWindow,
     frames: impl ExactSizeIterator<Item = usize>,
     region: &Region,
-    ty: SampleType,
-    samples: &mut Vec<u8>,
+    samples: &mut [u8],
 ) -> Result<()> {
-    let frame_bytes = region.voxels() * ty.size();
-    samples.resize(frame_bytes * frames.len(), 0);
-    if frame_bytes == 0 {
+    if samples.is_empty() {
         return Ok(());
     }
+    let frame_bytes = samples.len() / frames.len();
     for (frame, bytes) in frames.zip(samples.chunks_exact_mut(frame_bytes)) {
         window.read_box(frame, region, bytes)?;
     }

@@ -10,7 +10,7 @@
 use super::learn::learned_functions;
 use super::smoothness::{AXES, roughest_first};
 use super::spread::evenly;
-use super::{ConvertConfig, Pool, SchemeConstraint, SpatialPredictor};
+use super::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use wavesplat_core::base::error::{Error, Result};
@@ -21,7 +21,7 @@ use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};
 use wavesplat_core::codec::real::Real;
 use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
-use wavesplat_core::codec::trial::{Scratch, Trial};
+use wavesplat_core::codec::trial::Trial;
 use wavesplat_core::source::{Archive, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Basis;
 use wavesplat_format::Packing;
@@ -69,17 +69,11 @@ struct Sampled {
 }
 
 /// A transform along time, and the transformed boxes.
-struct Transformed<'a, R> {
+struct Transformed<'a, R: Real> {
     /// For the scheme that is tried now: making the functions of a long window takes longer than a trial.
     codec: Mutex<WindowCodec>,
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
-}
-
-/// The boxes for trials, and reusable scratch.
-struct Trials<'a, R> {
-    boxes: Vec<Transformed<'a, R>>,
-    idle: Pool<Scratch<R>>,
 }
 
 impl SchemeSelector<'_> {
@@ -108,12 +102,12 @@ impl SchemeSelector<'_> {
         let boxes = self.boxes()?;
         let families = self.families(&self.order(&boxes))?;
         let (mut learned, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|f| f.basis == Basis::Learned);
-        let mut trials = Trials { boxes: self.transformed::<R>(&others, &boxes), idle: Pool::default() };
+        let mut trials = self.transformed::<R>(&others, &boxes);
         let others: Vec<_> = others.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
         // Making long functions orthonormal takes a time of the cube of their length: only if they can win.
         let least = others.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
         learned.retain(|scheme| bytes_of_functions(scheme) < least);
-        trials.boxes.extend(self.transformed(&learned, &boxes));
+        trials.extend(self.transformed(&learned, &boxes));
         let learned = learned.into_iter().map(|scheme| self.tried(scheme, &trials));
         let families: Vec<_> = learned.chain(others).collect();
         let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
@@ -135,25 +129,21 @@ impl SchemeSelector<'_> {
     }
 
     /// Whether most samples take less by lists of their values than by a scheme: then no blocks are above others.
-    fn is_listed<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> bool {
-        let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
+    fn is_listed<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &[Transformed<'_, R>]) -> bool {
+        let of_basis = trials.iter().find(|b| b.basis == scheme.basis);
         let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return false };
         let codec = self.with_scheme(scheme, of_basis);
-        let mut scratch = trials.idle.take().unwrap_or_default();
-        let mut is_listed = |b: &&Trial<'_, R>| {
-            let coded = b.bytes(&codec, pyramid, &mut scratch);
-            b.listed_bytes(&codec, coded, &mut scratch).is_some()
-        };
-        let listed: usize = of_basis.boxes.iter().filter(&mut is_listed).map(Trial::voxels).sum();
+        let is_listed = |b: &&Trial<'_, R>| b.listed_bytes(&codec, b.bytes(&codec, pyramid)).is_some();
+        let listed: usize = of_basis.boxes.iter().filter(is_listed).map(Trial::voxels).sum();
         2 * listed > of_basis.boxes.iter().map(Trial::voxels).sum()
     }
 
     /// The codec of the chosen scheme.
-    fn finished<R: Real + Send + Sync>(&self, mut scheme: Scheme, trials: Trials<'_, R>) -> WindowCodec {
+    fn finished<R: Real + Send + Sync>(&self, mut scheme: Scheme, trials: Vec<Transformed<'_, R>>) -> WindowCodec {
         let is_in_space = scheme.pyramid.as_ref().is_some_and(|p| p.order.iter().any(|axis| *axis != Axis::T));
         let has_tiers = self.tiers > 0 && is_in_space && !(self.lists && self.is_listed(&scheme, &trials));
         scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = if has_tiers { self.tiers } else { 0 });
-        let of_basis = trials.boxes.into_iter().find(|b| b.basis == scheme.basis);
+        let of_basis = trials.into_iter().find(|b| b.basis == scheme.basis);
         match of_basis {
             Some(of_basis) => {
                 let codec = of_basis.codec.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -182,7 +172,7 @@ impl SchemeSelector<'_> {
     }
 
     /// The scheme with the step that makes the boxes smallest. A coarseness of exactly 1 stays.
-    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &Trials<'_, R>) -> (f64, Scheme) {
+    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &[Transformed<'_, R>]) -> (f64, Scheme) {
         if first.1.coarseness == 1.0 {
             return first;
         }
@@ -194,7 +184,7 @@ impl SchemeSelector<'_> {
         &self,
         first: &(f64, Scheme),
         factor: f64,
-        trials: &Trials<'_, R>,
+        trials: &[Transformed<'_, R>],
     ) -> (f64, Scheme) {
         let mut best = first.clone();
         loop {
@@ -208,7 +198,7 @@ impl SchemeSelector<'_> {
     }
 
     /// A scheme with its estimated bytes of the window.
-    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &Trials<'_, R>) -> (f64, Scheme) {
+    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &[Transformed<'_, R>]) -> (f64, Scheme) {
         (self.bytes(&scheme, trials), scheme)
     }
 
@@ -400,23 +390,22 @@ impl SchemeSelector<'_> {
     }
 
     /// Estimates the bytes of the window.
-    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &Trials<'_, R>) -> f64 {
-        let of_basis = trials.boxes.iter().find(|b| b.basis == scheme.basis);
+    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &[Transformed<'_, R>]) -> f64 {
+        let of_basis = trials.iter().find(|b| b.basis == scheme.basis);
         let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
         let codec = &*self.with_scheme(scheme, of_basis);
-        let bytes = |b: &Trial<'_, R>| {
-            let mut scratch = trials.idle.take().unwrap_or_default();
-            let bytes = b.bytes(codec, pyramid, &mut scratch);
-            trials.idle.put(scratch);
-            (bytes, b.voxels())
-        };
+        let bytes = |b: &Trial<'_, R>| (b.bytes(codec, pyramid), b.voxels());
         let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         let whole = self.archive.grid.dims.iter().product::<usize>() * self.channels.len();
         bytes as f64 * whole as f64 / voxels as f64 + bytes_of_functions(scheme)
     }
 
     /// The codec of a scheme with the same functions as those of a transform along time.
-    fn with_scheme<'a, R>(&self, scheme: &Scheme, of_basis: &'a Transformed<'_, R>) -> MutexGuard<'a, WindowCodec> {
+    fn with_scheme<'a, R: Real>(
+        &self,
+        scheme: &Scheme,
+        of_basis: &'a Transformed<'_, R>,
+    ) -> MutexGuard<'a, WindowCodec> {
         let mut codec = of_basis.codec.lock().unwrap_or_else(PoisonError::into_inner);
         codec.scheme = scheme.clone().into();
         codec

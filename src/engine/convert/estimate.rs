@@ -5,7 +5,7 @@ use super::gather::{Batch, WindowReader};
 use super::record::window_record;
 use super::spread::evenly;
 use super::variation::Variation;
-use super::{ConvertConfig, Encoders, Plan, Pool, WindowJob, WindowsDone, bug, encode_batch};
+use super::{ConvertConfig, Encoders, Plan, WindowJob, WindowsDone, bug, encode_batch};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -17,6 +17,7 @@ use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::range_bound;
+use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::encode::Encoded;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan_frame};
@@ -175,10 +176,10 @@ impl FramesRead<'_> {
     /// The first frame of a window, and the frames with the least and the largest sample of the coded blocks.
     fn extreme_frames(&self, window: &dyn FrameWindow, variation: &mut Variation) -> Result<BTreeSet<usize>> {
         let mut ranges = vec![Scan::NOTHING.range; window.frames()];
-        let mut samples = Vec::new();
         for (number, block) in self.blocks.iter().enumerate() {
             let (region, ty) = (self.plan.blocks.region(*block), self.archive.sample);
-            read_frames_into(window, 0..window.frames(), &region, ty, &mut samples)?;
+            let mut samples = Buffer::with_len(window.frames() * region.voxels() * ty.size());
+            read_frames_into(window, 0..window.frames(), &region, &mut samples)?;
             let extent = BlockWithGhosts { size: region.dims(), known: region.dims() };
             variation.add_block(number, self.blocks.len(), &extent, ty, self.missing_value, &samples);
             for (range, frame) in ranges.iter_mut().zip(samples.chunks_exact(region.voxels() * ty.size())) {
@@ -223,8 +224,7 @@ impl BlocksCoded<'_> {
         scheme: &mut Option<Scheme>,
         progress: &dyn Progress,
     ) -> Result<f64> {
-        let (done, idle) = (WindowsDone::default(), Pool::default());
-        let mut reader = WindowReader::new(self.input, self.plan, &done, &idle);
+        let mut reader = WindowReader::new(self.input, self.plan, &WindowsDone::default());
         if self.is_rough {
             reader.choose_roughly(scheme.take());
         }
@@ -255,8 +255,7 @@ impl BlocksCoded<'_> {
         for ids in ids.chunks(self.plan.room(&job.codec).batch) {
             let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
             let batch = Batch { window: job.clone(), blocks, last: false };
-            for Encoded { block, .. } in
-                encode_batch(self.input.config.level, self.plan, &self.encoders, reader.idle, batch)?.blocks
+            for Encoded { block, .. } in encode_batch(self.input.config.level, self.plan, &self.encoders, batch)?.blocks
             {
                 bytes += block.stored_len() as f64 + LEAF_SHARE * block.entry_len() as f64;
                 voxels += self.plan.size(block.id).iter().product::<usize>();

@@ -5,7 +5,7 @@ use super::coarse::CoarseBlocks;
 use super::coded_input::{BRIGHTNESS, CodedInput};
 use super::sampled::{self, Pixel};
 use super::warnings::{self, Fill, Findings};
-use super::{ConvertConfig, MissingPolicy, Plan, Pool, WindowJob, WindowsDone};
+use super::{ConvertConfig, MissingPolicy, Plan, WindowJob, WindowsDone};
 use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,6 +13,7 @@ use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec::bound::{self, Bound, ErrorBound};
+use wavesplat_core::codec::buffer::{self, Buffer};
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan};
 use wavesplat_core::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
@@ -31,7 +32,7 @@ pub(super) struct Batch {
 #[derive(Debug)]
 pub(super) struct BlockSamples {
     pub(super) id: BlockId,
-    pub(super) samples: Vec<u8>,
+    pub(super) samples: Buffer<u8>,
 }
 
 /// Reads all windows in order until the frames end, and sends those that the file does not have yet. Returns the time
@@ -41,10 +42,9 @@ pub(super) fn read(
     input: &CodedInput,
     plan: &Plan<'_>,
     done: &WindowsDone,
-    idle: &Pool<Vec<u8>>,
     out: &Sender<Batch>,
 ) -> Result<(Duration, Findings)> {
-    let mut reader = WindowReader::new(input, plan, done, idle);
+    let mut reader = WindowReader::new(input, plan, done);
     done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
     reader.before = reader.frames;
     let mut busy = Duration::ZERO;
@@ -81,8 +81,6 @@ const ROUGH: usize = 4;
 pub(super) struct WindowReader<'a> {
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
-    /// Buffers for the samples of blocks.
-    pub(super) idle: &'a Pool<Vec<u8>>,
     /// The archive of the coded samples.
     archive: &'a Archive,
     /// The pixels of a sampled bound.
@@ -105,7 +103,7 @@ pub(super) struct WindowReader<'a> {
 }
 
 impl<'a> WindowReader<'a> {
-    pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, done: &WindowsDone, idle: &'a Pool<Vec<u8>>) -> Self {
+    pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, done: &WindowsDone) -> Self {
         let CodedInput { config, archive, .. } = input;
         let pixels = match config.bound {
             Bound::Sampled { samples, seed } => sampled::pixels(archive.grid.dims, samples, seed),
@@ -122,7 +120,6 @@ impl<'a> WindowReader<'a> {
         Self {
             config,
             plan,
-            idle,
             archive,
             pixels,
             range,
@@ -247,6 +244,7 @@ impl<'a> WindowReader<'a> {
             before,
         };
         let mut codec = selector.choose()?;
+        buffer::release_spare(); // boxes of trials are smaller than blocks
         self.scheme = Some(Scheme::clone(&codec.scheme));
         codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
         self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
@@ -371,9 +369,9 @@ impl<'a> WindowReader<'a> {
         let Region { start, .. } = self.plan.blocks.region(id.block as usize);
         let known = self.plan.block_with_ghosts(&job.codec, id.block as usize).known;
         let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
-        let mut samples = self.idle.take().unwrap_or_default();
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
-        read_frames_into(window, 0..window.frames(), &region, sample, &mut samples)?;
+        let mut samples = Buffer::with_len(window.frames() * region.voxels() * sample.size());
+        read_frames_into(window, 0..window.frames(), &region, &mut samples)?;
         Ok(BlockSamples { id, samples })
     }
 
@@ -383,8 +381,8 @@ impl<'a> WindowReader<'a> {
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
         let each = sample.size();
         let end = |places: &[usize]| places.last().map_or(0, |last| last + 1);
-        let (mut samples, mut rows) = (self.idle.take().unwrap_or_default(), Vec::new());
-        samples.clear();
+        let mut samples = Buffer::with_len(window.frames() * zs.len() * ys.len() * xs.len() * each);
+        let (mut left, mut rows) = (samples.chunks_exact_mut(each), Vec::new());
         let row = (end(xs) - xs[0]) * each;
         let together = (ROWS_BYTES / (row << id.tier)).max(1);
         for (frame, z) in (0..window.frames()).flat_map(|frame| zs.iter().map(move |z| (frame, *z))) {
@@ -393,7 +391,8 @@ impl<'a> WindowReader<'a> {
                 rows.resize(part.voxels() * each, 0);
                 window.read_box(frame, &part, &mut rows)?;
                 for row in ys.iter().map(|y| &rows[(y - ys[0]) * row..]) {
-                    xs.iter().for_each(|x| samples.extend_from_slice(&row[(x - xs[0]) * each..][..each]));
+                    let nodes = xs.iter().map(|x| &row[(x - xs[0]) * each..][..each]);
+                    nodes.zip(&mut left).for_each(|(node, sample)| sample.copy_from_slice(node));
                 }
             }
         }

@@ -64,6 +64,7 @@ use wavesplat_core::base::memory;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::codec::WindowCodec;
 pub use wavesplat_core::codec::bound::{Bound, range_bound};
+use wavesplat_core::codec::buffer::{self, Buffer};
 use wavesplat_core::codec::encode::{Encoded, Encoder};
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{Archive, ColourTransform, FrameSource};
@@ -306,16 +307,17 @@ pub fn convert_into<W: Write>(
     let mut writer = WindowWriter::new(input, &plan, target);
     let (to_workers, from_reader) = bounded(0);
     let (to_writer, from_workers) = bounded(0);
-    let idle = Pool::default();
-    let ((read, findings), encoding) = std::thread::scope(|scope| {
+    let ran = std::thread::scope(|scope| {
         // Each stage owns its ends of the channels. When a stage ends, even by an error, its neighbours end too.
-        let (plan, done, idle) = (&plan, &done, &idle);
-        let reader = scope.spawn(move || gather::read(source, input, plan, done, idle, &to_workers));
-        let workers = scope.spawn(move || encode(config.level, plan, idle, &from_reader, &to_writer));
+        let (plan, done) = (&plan, &done);
+        let reader = scope.spawn(move || gather::read(source, input, plan, done, &to_workers));
+        let workers = scope.spawn(move || encode(config.level, plan, &from_reader, &to_writer));
         let written = writer.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
-    })?;
+    });
+    buffer::release_spare();
+    let ((read, findings), encoding) = ran?;
     let report = writer.finish(started, read, &findings, encoding)?;
     progress.finish();
     Ok(report)
@@ -376,18 +378,12 @@ impl WindowsDone {
 }
 
 /// The worker stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
-fn encode(
-    level: i32,
-    plan: &Plan<'_>,
-    read: &Pool<Vec<u8>>,
-    batches: &Receiver<Batch>,
-    out: &Sender<EncodedBatch>,
-) -> Result<Duration> {
+fn encode(level: i32, plan: &Plan<'_>, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
     let encoders = Encoders::default();
     let mut busy = Duration::ZERO;
     for batch in batches {
         let started = Instant::now();
-        let encoded = encode_batch(level, plan, &encoders, read, batch)?;
+        let encoded = encode_batch(level, plan, &encoders, batch)?;
         busy += started.elapsed();
         if out.send(encoded).is_err() {
             break; // the writer failed and reports why
@@ -403,15 +399,13 @@ fn encode_batch(
     level: i32,
     plan: &Plan<'_>,
     encoders: &Encoders,
-    read: &Pool<Vec<u8>>,
     Batch { window, blocks, last }: Batch,
 ) -> Result<EncodedBatch> {
     let encode = |BlockSamples { id, samples }| {
         let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-        let samples = to_channel(plan.colour_transform, id, samples, read);
+        let samples = to_channel(plan.colour_transform, id, samples);
         let encoded = encode_block(&mut encoder, plan, &window, id, &samples);
         encoders.put(encoder);
-        read.put(samples);
         encoded
     };
     window.coarse.decode_shared(plan, &window.codec, blocks.iter().map(|block| block.id))?;
@@ -441,17 +435,11 @@ fn encode_block(
 }
 
 /// Converts the samples of a block to those of its channel.
-fn to_channel(
-    colour_transform: Option<&ColourTransform>,
-    id: BlockId,
-    samples: Vec<u8>,
-    idle: &Pool<Vec<u8>>,
-) -> Vec<u8> {
+fn to_channel(colour_transform: Option<&ColourTransform>, id: BlockId, samples: Buffer<u8>) -> Buffer<u8> {
     let Some(colour_transform) = colour_transform else { return samples };
-    let mut channel = idle.take().unwrap_or_default();
-    channel.resize(samples.len() / colour_transform.sample.size() * ColourTransform::SAMPLE.size(), 0);
+    let voxels = samples.len() / colour_transform.sample.size();
+    let mut channel = Buffer::with_len(voxels * ColourTransform::SAMPLE.size());
     colour_transform.paint(id.channel.into(), &samples, &mut channel);
-    idle.put(samples);
     channel
 }
 

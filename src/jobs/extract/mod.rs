@@ -22,6 +22,7 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::memory;
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::zeroed::Zeroed;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::WantedFrames;
 use wavesplat_engine::file::CoefficientFile;
@@ -120,10 +121,10 @@ pub fn extract_to(
             fetched = begun + fetch_ahead(file, config.channel, &list[begun..])?;
         }
         begun += together.len();
-        buffers.resize_with(together.len(), Vec::new);
+        buffers.resize_with(together.len(), Zeroed::default);
         let read = together.par_iter().zip(&mut buffers);
         let read = read.map(|(piece, bytes)| read_piece(file, config, piece, pieces.blocks, bytes));
-        for (read, bytes) in read.collect::<Result<Vec<_>>>()?.into_iter().zip(&buffers) {
+        for (read, bytes) in read.collect::<Result<Vec<_>>>()? {
             write(bytes)?;
             report.blocks_read += read.blocks_read;
             report.bytes_read += read.bytes_read;
@@ -221,24 +222,29 @@ fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
 
-/// Fills `out` with the samples of a piece. Reports the blocks that it read.
-fn read_piece(
+/// The samples of a piece, in `buffer`, and the blocks that it read.
+fn read_piece<'a>(
     file: &CoefficientFile,
     config: &ExtractConfig,
     piece: &Piece,
     at_once: usize,
-    out: &mut Vec<u8>,
-) -> Result<ExtractReport> {
+    buffer: &'a mut Zeroed<u8>,
+) -> Result<(ExtractReport, &'a [u8])> {
     let mut report = ExtractReport::default();
     let strides = Strides::new(&config.order, piece.frames.len(), &piece.region);
-    out.resize(piece.frames.len() * piece.region.voxels() * file.sample().size(), 0); // blocks overwrite all of it
+    let bytes = piece.frames.len() * piece.region.voxels() * file.sample().size();
+    if buffer.len() < bytes {
+        *buffer = Zeroed::default();
+        *buffer = Zeroed::new(bytes);
+    }
+    let out = &mut buffer[..bytes]; // blocks overwrite all of it
     let mut first = 0;
     for frames in file.by_window(&piece.frames) {
         let target = Target { strides, region: piece.region, first };
         read_window(file, config.channel, frames, &target, at_once, out, &mut report)?;
         first += frames.len();
     }
-    Ok(report)
+    Ok((report, out))
 }
 
 /// Where samples go in the array of a piece.

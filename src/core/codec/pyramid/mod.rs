@@ -285,18 +285,17 @@ impl<'a> PredictionPasses<'a> {
         source: Nodes<'_, R>,
         known: Option<Nodes<'_, R>>,
         field: &mut [R],
-        split: &mut Vec<R>,
         codes: &mut [i32],
     ) -> bool {
         let mut fits = true;
         let ranges: Vec<_> = (0..self.pyramids).map(|number| self.code_ranges(number)).collect();
-        split.resize(self.codes() / self.pyramids, R::default());
+        let mut split = Buffer::with_len(self.codes() / self.pyramids);
         let sources = source.values.chunks_exact(source.size.iter().product::<usize>() * self.shape[3]);
         let fields = field.chunks_exact_mut(self.pyramid_nodes());
         for (number, ((nodes, values), ranges)) in fields.zip(sources).zip(&ranges).enumerate() {
-            self.split(values, source.size, split);
+            self.split(values, source.size, &mut split);
             let (codes, known) = (apart(codes, ranges), known.map(|known| self.known(number, known)));
-            let mut encoding = Encoding { split, codes, passes: self.inverses(step), known, fits: true };
+            let mut encoding = Encoding { split: &split, codes, passes: self.inverses(step), known, fits: true };
             self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);
             fits &= encoding.fits;
         }

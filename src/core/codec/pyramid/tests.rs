@@ -167,10 +167,10 @@ fn encoded_nodes_are_those_of_the_format() {
         let outer = with_ghosts(&pyramid, shape);
         let source: Vec<f64> = (0..outer.iter().product()).map(|_| number(state)).collect();
         let passes = passes_of(&pyramid, shape);
-        let (mut split, mut codes) = (Vec::new(), vec![99; codes_in(&pyramid, shape)]);
+        let mut codes = vec![99; codes_in(&pyramid, shape)];
         let mut field = vec![f64::NAN; shape.iter().product()];
         let size = [outer[0], outer[1], outer[2]];
-        assert!(passes.encode(0.7, Nodes { values: &source, size }, None, &mut field, &mut split, &mut codes));
+        assert!(passes.encode(0.7, Nodes { values: &source, size }, None, &mut field, &mut codes));
         let mut expected = Vec::new();
         let decoded = twin(&pyramid, shape, |(pass, at), _, p| {
             let step = pyramid.step(0.7, pass.level);
@@ -210,9 +210,8 @@ fn codes_that_do_not_fit_are_noticed() {
     let passes = passes_of(&pyramid, [3, 1, 1, 1]);
     for (largest, fits) in [(1e9, true), (2e9, false), (-1e9, true), (-2e9, false), (f64::INFINITY, false)] {
         let source = [0.0, largest, 1.0];
-        let (field, split) = (&mut [0.0; 3], &mut Vec::new());
         assert_eq!(
-            passes.encode(1.0, Nodes { values: &source, size: [3, 1, 1] }, None, field, split, &mut [0; 3]),
+            passes.encode(1.0, Nodes { values: &source, size: [3, 1, 1] }, None, &mut [0.0; 3], &mut [0; 3]),
             fits,
             "{largest}"
         );

@@ -191,10 +191,10 @@ fn blocks_of_tiers_are_encoded_as_the_format_says() {
         let n = 1 << case.tier;
         let [x, y, z, _] = case.outer().map(|extent| extent.div_ceil(n));
         let source: Vec<f64> = (0..x * y * z * case.ks).map(|_| below(1000, state) as f64 / 70.0).collect();
-        let (mut split, mut codes) = (Vec::new(), vec![99; passes.codes()]);
+        let mut codes = vec![99; passes.codes()];
         let mut field = vec![f64::NAN; passes.nodes().iter().product()];
         let of_source = Nodes { values: &source, size: [x, y, z] };
-        assert!(passes.encode(0.7, of_source, of, &mut field, &mut split, &mut codes));
+        assert!(passes.encode(0.7, of_source, of, &mut field, &mut codes));
         let mut expected = vec![0; codes.len()];
         let twin = case.twin(&known, |level, [i, j, l, k], code, p| {
             let step = case.pyramid.step(0.7, level);
