@@ -352,20 +352,24 @@ impl Block {
     pub fn samples_of(&self, codec: &WindowCodec, wanted: &WantedFrames) -> Buffer<u8> {
         if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
             let field = self.field_of(codec, wanted);
-            if let Some(values) = field.singles() {
-                return self.stored_singles(codec, values, &wanted.frames);
+            if field.is_single() {
+                return self.stored_singles(codec, &field, &wanted.frames);
             }
         }
         self.decode(codec, wanted, |_, _| {})
     }
 
     /// Samples in the case that nodes are samples and already have the sample type.
-    fn stored_singles(&self, codec: &WindowCodec, values: &[f32], frames: &[usize]) -> Buffer<u8> {
-        let mut out = Buffer::with_len(4 * values.len());
+    fn stored_singles(&self, codec: &WindowCodec, field: &Field<'_>, frames: &[usize]) -> Buffer<u8> {
+        let mut out = Buffer::with_len(4 * codec.frames() * self.voxels);
         for frame in frames {
-            let of_frame = frame * self.voxels..(frame + 1) * self.voxels;
-            let bytes = &mut out.as_chunks_mut().0[of_frame.clone()];
-            bytes.iter_mut().zip(&values[of_frame]).for_each(|(bytes, value)| *bytes = value.to_le_bytes());
+            let bytes = &mut out.as_chunks_mut().0[frame * self.voxels..(frame + 1) * self.voxels];
+            match field.plane(*frame, self.voxels, &mut Vec::new()) {
+                Plane::Single(values) => {
+                    bytes.iter_mut().zip(values).for_each(|(bytes, value)| *bytes = value.to_le_bytes());
+                }
+                _ => bytes.fill([0; 4]),
+            }
         }
         self.clip(codec, frames, &mut out);
         self.put_overrides(4, &mut out);

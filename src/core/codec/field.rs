@@ -11,15 +11,15 @@ use crate::wavelet::{LANES, Lane, TimeBasis};
 use wavesplat_format::{EncodedBlock, Pyramid, SparseCodes};
 
 /// The decoded coefficients of a block.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Field<'a> {
     values: Values<'a>,
-    /// Whether each k may have coefficients that are not zero.
+    /// Whether each k may have coefficients that are not zero. The values of others are arbitrary: zeros would take fresh memory.
     marked: Vec<bool>,
 }
 
 /// `k * voxels + voxel`
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 enum Values<'a> {
     /// All are zero.
     Zero,
@@ -47,18 +47,7 @@ pub struct Above {
 impl Above {
     /// Copies the `size` nodes from `start` on out of the block above, which has `outer` nodes along x, y, z.
     pub fn new(above: &Field<'_>, outer: [usize; 3], start: [usize; 3], size: [usize; 3]) -> Self {
-        fn cut<R: Real>(values: &[R], [outer, start, size]: [[usize; 3]; 3], ks: usize) -> Buffer<R> {
-            let mut nodes = Buffer::with_len(size.iter().product::<usize>() * ks);
-            Nodes { values, size: outer }.copy(start, size, &mut nodes);
-            nodes
-        }
-        let (places, ks) = ([outer, start, size], above.marked.len());
-        let values = match &above.values {
-            Values::Single(values) => Values::Single(cut(values, places, ks)),
-            Values::Double(values) => Values::Double(cut(values, places, ks)),
-            Values::Zero | Values::Codes { .. } => Values::Zero,
-        };
-        Self { nodes: Field { values, marked: above.marked.clone() }, size }
+        Self { nodes: above.cut([outer, start, size]), size }
     }
 
     /// Bytes of memory that they take.
@@ -68,12 +57,12 @@ impl Above {
 
     /// The nodes of a block that is coded in 32-bit floats.
     pub(super) fn singles(&self) -> Nodes<'_, f32> {
-        Nodes { values: self.nodes.singles().unwrap_or_default(), size: self.size }
+        Nodes { values: self.nodes.singles().unwrap_or_default(), size: self.size, marked: Some(&self.nodes.marked) }
     }
 
     /// The nodes of a block that is coded in 64-bit floats.
     pub(super) fn doubles(&self) -> Nodes<'_, f64> {
-        Nodes { values: self.nodes.doubles().unwrap_or_default(), size: self.size }
+        Nodes { values: self.nodes.doubles().unwrap_or_default(), size: self.size, marked: Some(&self.nodes.marked) }
     }
 }
 
@@ -145,7 +134,7 @@ impl Field<'static> {
         wanted: &[bool],
     ) -> Self {
         if let Some(above) = above.filter(|_| codec.is_all_above()) {
-            return above.nodes.clone();
+            return above.nodes.cut([above.size, [0; 3], above.size]);
         }
         let of = Refined { codec, size, step, codes, wanted };
         let (values, marked) = match &codec.scheme.pyramid {
@@ -184,6 +173,22 @@ impl Field<'static> {
 }
 
 impl Field<'_> {
+    /// Copies a box: the nodes along x, y, z that there are, the first of the box, and those of the box.
+    fn cut(&self, [outer, start, size]: [[usize; 3]; 3]) -> Field<'static> {
+        fn copy<R: Real>(nodes: Nodes<'_, R>, start: [usize; 3], size: [usize; 3], ks: usize) -> Buffer<R> {
+            let mut copy = Buffer::with_len(size.iter().product::<usize>() * ks);
+            nodes.copy(start, size, &mut copy);
+            copy
+        }
+        let (marked, ks) = (Some(&self.marked[..]), self.marked.len());
+        let values = match &self.values {
+            Values::Single(values) => Values::Single(copy(Nodes { values, size: outer, marked }, start, size, ks)),
+            Values::Double(values) => Values::Double(copy(Nodes { values, size: outer, marked }, start, size, ks)),
+            Values::Zero | Values::Codes { .. } => Values::Zero,
+        };
+        Field { values, marked: self.marked.clone() }
+    }
+
     /// Bytes of memory that the coefficients take.
     pub fn held_bytes(&self) -> usize {
         match &self.values {
@@ -209,22 +214,29 @@ impl<'a> Field<'a> {
 
     /// The coefficient at `k * voxels + voxel`.
     pub fn at(&self, index: usize) -> f64 {
-        match &self.values {
-            Values::Zero => 0.0,
-            Values::Codes { step, codes } => f64::from(codes[index]) * step,
-            Values::Single(values) => values[index].into(),
-            Values::Double(values) => values[index],
-        }
+        let (all, value) = match &self.values {
+            Values::Zero => return 0.0,
+            Values::Codes { step, codes } => (codes.len(), f64::from(codes[index]) * step),
+            Values::Single(values) => (values.len(), values[index].into()),
+            Values::Double(values) => (values.len(), values[index]),
+        };
+        let k = index / (all / self.marked.len());
+        if self.marked[k] { value } else { 0.0 }
     }
 
-    /// All coefficients, if they are 32-bit floats.
-    pub(super) fn singles(&self) -> Option<&[f32]> {
+    /// All coefficients, if they are 32-bit floats. Those of k that are not marked are arbitrary.
+    fn singles(&self) -> Option<&[f32]> {
         if let Values::Single(values) = &self.values { Some(values) } else { None }
     }
 
-    /// All coefficients, if a pyramid decoded them in 64-bit floats.
-    pub(super) fn doubles(&self) -> Option<&[f64]> {
+    /// The same in 64-bit floats.
+    fn doubles(&self) -> Option<&[f64]> {
         if let Values::Double(values) = &self.values { Some(values) } else { None }
+    }
+
+    /// Whether all coefficients are 32-bit floats.
+    pub(super) fn is_single(&self) -> bool {
+        matches!(self.values, Values::Single(_))
     }
 
     /// The change from leaving out each level part of a pyramid that has codes, and all finer ones.
@@ -237,15 +249,21 @@ impl<'a> Field<'a> {
     ) -> Vec<Change> {
         let parts = passes.coded(codes);
         match &self.values {
-            Values::Single(field) => passes.changes(&parts, step, codes, above.map(Above::singles), field),
-            Values::Double(field) => passes.changes(&parts, step, codes, above.map(Above::doubles), field),
+            Values::Single(field) => {
+                passes.changes(&parts, step, codes, above.map(Above::singles), field, &self.marked)
+            }
+            Values::Double(field) => {
+                passes.changes(&parts, step, codes, above.map(Above::doubles), field, &self.marked)
+            }
             Values::Zero | Values::Codes { .. } => vec![Change::default(); PARTS],
         }
     }
 
-    /// Copies coefficients from index `first` on.
-    fn load(&self, first: usize, out: &mut [f64]) {
+    /// Copies coefficients of one k from voxel `voxel` on.
+    fn load(&self, k: usize, voxels: usize, voxel: usize, out: &mut [f64]) {
+        let first = k * voxels + voxel;
         match &self.values {
+            _ if !self.marked[k] => out.fill(0.0),
             Values::Zero => out.fill(0.0),
             Values::Codes { step, codes } => dispatch!(scale(*step, &codes[first..], out)),
             Values::Single(values) => dispatch!(widen(&values[first..], out)),
@@ -286,7 +304,7 @@ impl<'a> Field<'a> {
         let mut run = [0.0; 8 * RUN];
         for (frame, first) in frames.iter().flat_map(|frame| (0..voxels).step_by(8 * RUN).map(move |at| (frame, at))) {
             let run = &mut run[..(8 * RUN).min(voxels - first)];
-            self.load(frame * voxels + first, run);
+            self.load(*frame, voxels, first, run);
             visit(frame * voxels + first, run);
         }
     }
@@ -355,7 +373,7 @@ impl<'a> Run<'a> {
 
     fn load(&mut self, field: &Field<'_>, voxels: usize, first: usize, count: usize) {
         for (i, k) in self.ks.iter().enumerate() {
-            field.load(k * voxels + first, &mut self.row[..count]);
+            field.load(*k, voxels, first, &mut self.row[..count]);
             let of_k = self.coefficients[i..].iter_mut().step_by(self.ks.len());
             of_k.zip(self.row.as_chunks::<LANES>().0).for_each(|(lane, row)| *lane = *row);
         }
@@ -409,7 +427,8 @@ impl Refined<'_> {
             return (Values::Zero, vec![false; ks]);
         }
         let mut field = Buffer::with_len(nodes.iter().product::<usize>() * ks);
-        let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
+        let mut marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
+        marked.iter_mut().zip(wanted).for_each(|(marked, wanted)| *marked &= *wanted);
         (values(field), marked)
     }
 }

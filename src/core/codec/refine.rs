@@ -92,7 +92,7 @@ impl Source<'_> {
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
         let source = outer.load(&weighing);
-        let nodes = Nodes { values: &source, size: outer.size };
+        let nodes = Nodes { values: &source, size: outer.size, marked: None };
         let encode =
             |step, field: &mut [R], codes: &mut [i32]| passes.encode(step, nodes, known, field, codes).then_some(());
         encode(step, field, codes)?;
@@ -114,8 +114,9 @@ impl Source<'_> {
         let Checked { listed, tally } = checked;
         let mut tally = tally?;
         let outliers = tally.take_outliers(self.codec, self.samples);
+        let marked = passes.marked(&listed, known);
         // The directory lists no other parts.
-        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field);
+        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field, &marked);
         let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })

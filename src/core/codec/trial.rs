@@ -61,7 +61,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         let mut field = Buffer::with_len(passes.nodes().iter().product());
         let mut codes = Buffer::with_len(passes.codes());
-        let nodes = Nodes { values: &self.nodes, size: self.outer };
+        let nodes = Nodes { values: &self.nodes, size: self.outer, marked: None };
         if !passes.encode(step, nodes, None, &mut field, &mut codes) {
             return None;
         }

@@ -13,7 +13,7 @@ use wavesplat::base::error::{Error, Result};
 
 /// The commands that are timed. FRAMES and FILE are the archive and its coefficient file, OUT is a new file, RANGE the
 /// range of the samples, TOLERANCE that of the run.
-const CASES: [(&str, &str); 18] = [
+const CASES: [(&str, &str); 21] = [
     ("convert", "wavesplat convert FRAMES -o OUT.wspl --tolerance TOLERANCE"),
     ("convert, Haar", "wavesplat convert FRAMES -o OUT.wspl --tolerance TOLERANCE --basis haar"),
     ("verify", "wavesplat verify FILE"),
@@ -28,6 +28,12 @@ const CASES: [(&str, &str); 18] = [
     ("one picture, all defaults", "wavesplat-render FILE -o OUT.png --frames 0"),
     ("composites", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite"),
     ("one composite", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite --frames 0"),
+    ("composites, ramp", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite --opacity 0:0,1:0.3"),
+    (
+        "one composite, ramp",
+        "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite --opacity 0:0,1:0.3 --frames 0",
+    ),
+    ("composites, shaded", "wavesplat-render FILE -o OUT.npy --range RANGE --mode composite --shade"),
     ("largest values", "wavesplat-render FILE -o OUT.npy --range RANGE --mode mip"),
     ("surfaces", "wavesplat-render FILE -o OUT.npy --range RANGE --mode iso"),
     ("one surface", "wavesplat-render FILE -o OUT.npy --range RANGE --mode iso --frames 0"),
@@ -108,7 +114,9 @@ impl Archive<'_> {
     /// The rows of the table, one for each command.
     fn rows(&self, say: &mut dyn FnMut(&str)) -> Result<String> {
         let convert = "wavesplat convert FRAMES -o FILE --tolerance TOLERANCE --range RANGE";
-        self.seconds(&self.config.programs, convert)?;
+        for build in 0..self.builds().len() {
+            self.seconds(build, convert)?; // a build reads its own file: formats differ
+        }
         let mut text = String::new();
         for (name, line) in CASES {
             say(&format!("{}: {name}", self.data.name));
@@ -121,25 +129,29 @@ impl Archive<'_> {
         Ok(text)
     }
 
+    /// The folders of the programs: those of this build, and of the other one.
+    fn builds(&self) -> Vec<&PathBuf> {
+        std::iter::once(&self.config.programs).chain(&self.config.against).collect()
+    }
+
     /// The least seconds of a command by this build, and by the other one.
     fn least(&self, line: &str) -> Result<Vec<f64>> {
-        let builds: Vec<&PathBuf> = std::iter::once(&self.config.programs).chain(&self.config.against).collect();
-        let mut least = vec![f64::INFINITY; builds.len()];
+        let mut least = vec![f64::INFINITY; self.builds().len()];
         for _ in 0..self.config.repeats {
-            for (folder, least) in builds.iter().zip(&mut least) {
-                *least = least.min(self.seconds(folder, line)?);
+            for (build, least) in least.iter_mut().enumerate() {
+                *least = least.min(self.seconds(build, line)?);
             }
         }
         Ok(least)
     }
 
-    /// The seconds that a command takes.
-    fn seconds(&self, folder: &Path, line: &str) -> Result<f64> {
+    /// The seconds that a command takes by the build with this number.
+    fn seconds(&self, build: usize, line: &str) -> Result<f64> {
         let mut words = line.split(' ');
         let name = words.next().unwrap_or_default();
-        let program = folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+        let program = self.builds()[build].join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
         let mut command = Command::new(&program);
-        let mut words: Vec<String> = words.map(|word| self.word(word)).collect();
+        let mut words: Vec<String> = words.map(|word| self.word(word, build)).collect();
         words.extend(["--quiet".into(), format!("--threads={}", self.config.threads)]);
         words.extend((name == "wavesplat-render").then(|| format!("--size={0}x{0}", self.config.size)));
         words.extend(line.contains(" -o ").then(|| "--force".into()));
@@ -154,13 +166,13 @@ impl Archive<'_> {
         }
     }
 
-    /// A word of a command, with this archive's names and numbers.
-    fn word(&self, word: &str) -> String {
+    /// A word of a command, with this archive's names and numbers, for the build with this number.
+    fn word(&self, word: &str, build: usize) -> String {
         let place = |name: &str| self.work.join(name).to_string_lossy().into_owned();
         let (lo, hi) = self.data.range;
         match word {
             "FRAMES" => self.data.path.to_string_lossy().into_owned(),
-            "FILE" => place("file.wspl"),
+            "FILE" => place(&format!("file{build}.wspl")),
             "RANGE" => format!("{lo},{hi}"),
             "TOLERANCE" => self.config.tolerance.to_string(),
             _ => word.strip_prefix("OUT").map_or(word.into(), |extension| place(&format!("out{extension}"))),

@@ -12,25 +12,35 @@ pub(crate) struct Nodes<'a, R> {
     pub(crate) values: &'a [R],
     /// Their number along x, y, z.
     pub(crate) size: [usize; 3],
+    /// Whether each k has nodes that are not zero; the values of others are arbitrary. `None` if all may have some.
+    pub(crate) marked: Option<&'a [bool]>,
 }
 
 impl<R: Real> Nodes<'_, R> {
     /// Whether all nodes of some k are zero.
-    pub(super) fn is_zero(&self, ks: Range<usize>) -> bool {
+    pub(super) fn is_zero(&self, mut ks: Range<usize>) -> bool {
         let each: usize = self.size.iter().product();
-        rows::is_zero(self.values.get(ks.start * each..ks.end * each).unwrap_or_default())
+        let nodes = |k: usize| self.values.get(k * each..(k + 1) * each).unwrap_or_default();
+        ks.all(|k| !self.has(k) || rows::is_zero(nodes(k)))
     }
 
-    /// The rest of a row of nodes, from the `x`-th on, and what follows it.
+    fn has(&self, k: usize) -> bool {
+        self.marked.is_none_or(|marked| marked[k])
+    }
+
+    /// The rest of a row of nodes, from the `x`-th on, and what follows it. Empty if all are zero.
     fn row(&self, k: usize, [x, y, z]: [usize; 3]) -> &[R] {
         let [nx, ny, nz] = self.size;
-        self.values.get(x + nx * (y + ny * (z + nz * k))..).unwrap_or_default()
+        let first = x + nx * (y + ny * (z + nz * k));
+        self.values.get(first..).filter(|_| self.has(k)).unwrap_or_default()
     }
 
-    /// Copies all k of a box of `[nx, ny, nz]` nodes from `start` on.
+    /// Copies a box of `[nx, ny, nz]` nodes from `start` on, of every k that has some.
     pub(crate) fn copy(&self, [x, y, z]: [usize; 3], [nx, ny, nz]: [usize; 3], out: &mut [R]) {
-        for (n, to) in out.chunks_exact_mut(nx).enumerate() {
-            put(self.row(n / (ny * nz), [x, y + n % ny, z + n / ny % nz]), 1, to);
+        for (k, of_k) in out.chunks_exact_mut(nx * ny * nz).enumerate().filter(|(k, _)| self.has(*k)) {
+            for (n, to) in of_k.chunks_exact_mut(nx).enumerate() {
+                put(self.row(k, [x, y + n % ny, z + n / ny]), 1, to);
+            }
         }
     }
 }

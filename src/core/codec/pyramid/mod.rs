@@ -216,7 +216,7 @@ impl<'a> PredictionPasses<'a> {
 
     /// Decodes every k that `wanted` marks into the field. `codes` are all codes of the block, as
     /// [`Self::placed_boxes`] places them. Returns for each k whether some node is not zero; if k is refined, the same
-    /// for all of them. The nodes of every other k are 0 or unspecified.
+    /// for all of them. Leaves the nodes of every other k as they are.
     pub(crate) fn decode_some<R: Real>(
         &self,
         wanted: &[bool],
@@ -230,8 +230,6 @@ impl<'a> PredictionPasses<'a> {
         for ((number, nodes), wanted) in pyramids.enumerate().zip(wanted.chunks_exact(self.shape[3])) {
             if marked[number * self.shape[3]] && wanted.contains(&true) {
                 self.stages.refine(wanted, nodes, &mut self.sparse(number, step, codes, known, PARTS));
-            } else {
-                nodes.fill(R::default());
             }
         }
         marked
@@ -239,13 +237,19 @@ impl<'a> PredictionPasses<'a> {
 
     /// For each k, whether some code or known node is not zero; if k is refined, the same for all of them.
     pub(crate) fn marked<R: Real>(&self, codes: &SparseCodes, known: Option<Nodes<'_, R>>) -> Vec<bool> {
-        let is_known = |k: usize| known.is_some_and(|known| !known.is_zero(k * self.shape[3]..(k + 1) * self.shape[3]));
-        let mut some: Vec<bool> = (0..self.pyramids).map(is_known).collect();
-        for (of, runs) in self.boxes.iter().zip(self.runs()).filter(|(of, _)| of.of.is_some()) {
-            let each = (of.at.extents[3] / self.pyramids).max(1);
-            runs.enumerate().for_each(|(n, run)| some[n / each] |= !codes.run(run).1.is_empty());
-        }
-        some.iter().flat_map(|some| std::iter::repeat_n(*some, self.shape[3])).collect()
+        let some = (0..self.pyramids).map(|number| self.is_marked(number, codes, known));
+        some.flat_map(|some| std::iter::repeat_n(some, self.shape[3])).collect()
+    }
+
+    /// Whether some code or known node of the pyramid with this number is not zero.
+    fn is_marked<R: Real>(&self, number: usize, codes: &SparseCodes, known: Option<Nodes<'_, R>>) -> bool {
+        let ks = number * self.shape[3]..(number + 1) * self.shape[3];
+        let has_codes = |(_, runs): (_, Range<usize>)| {
+            let each = runs.len() / self.pyramids;
+            (0..each).any(|n| !codes.run(runs.start + number * each + n).1.is_empty())
+        };
+        known.is_some_and(|known| !known.is_zero(ks))
+            || self.boxes.iter().zip(self.runs()).filter(|(of, _)| of.of.is_some()).any(has_codes)
     }
 
     /// As [`Self::marked`], from all codes, pass after pass.
@@ -264,7 +268,7 @@ impl<'a> PredictionPasses<'a> {
         known: Option<Nodes<'_, R>>,
         nodes: &mut Vec<R>,
     ) -> bool {
-        let some = self.marked(codes, known)[k];
+        let some = self.is_marked(k, codes, known);
         if some {
             nodes.resize(self.pyramid_nodes(), R::default());
             self.stages.refine(&[true], nodes, &mut self.sparse(k, step, codes, known, PARTS));
@@ -324,7 +328,8 @@ impl<'a> PredictionPasses<'a> {
         std::array::from_fn(|part| self.count(part as u8, codes) > 0)
     }
 
-    /// The changes of a decoded field from leaving out each part that `parts` marks and all finer ones.
+    /// The changes of a decoded field, whose other k than the marked ones are zero, from leaving out each part of `parts` and all
+    /// finer ones.
     pub(crate) fn changes<R: Real>(
         &self,
         parts: &[bool; PARTS],
@@ -332,6 +337,7 @@ impl<'a> PredictionPasses<'a> {
         codes: &SparseCodes,
         known: Option<Nodes<'_, R>>,
         field: &[R],
+        marked: &[bool],
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
         if !parts.contains(&true) {
@@ -339,7 +345,7 @@ impl<'a> PredictionPasses<'a> {
         }
         let mut rest = Buffer::with_len(self.pyramid_nodes());
         let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
-        for (number, nodes) in pyramids.filter(|(_, nodes)| !rows::is_zero(nodes)) {
+        for (number, nodes) in pyramids.filter(|(number, _)| marked[number * self.shape[3]]) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| parts[*part]) {
                 if part == 0 && !self.has_known() {
                     dispatch!(add_changes_to_zero(change, nodes));

@@ -136,6 +136,16 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
+/// Puts zeros for every k that is not marked. Decoding must have left its nodes as they were.
+pub(super) fn put_zeros(marked: &[bool], field: &mut [f64]) {
+    let each = field.len() / marked.len().max(1);
+    for nodes in field.chunks_exact_mut(each.max(1)).zip(marked).filter(|(_, marked)| !**marked).map(|(nodes, _)| nodes)
+    {
+        assert!(nodes.iter().all(|node| node.is_nan()));
+        nodes.fill(0.0);
+    }
+}
+
 #[test]
 fn decoded_nodes_are_those_of_the_format() {
     let state = &mut 3;
@@ -145,6 +155,7 @@ fn decoded_nodes_are_those_of_the_format() {
         let passes = passes_of(&pyramid, shape);
         let mut field = vec![f64::NAN; shape.iter().product()];
         let marked = passes.decode_some(&vec![true; shape[3]], 0.3, &passes.list(&codes), None, &mut field);
+        put_zeros(&marked, &mut field);
         assert_eq!(bits(&field), bits(&twin_decoded(&pyramid, shape, 0.3, &codes, PARTS)), "{pyramid:?} {shape:?}");
         assert_eq!(passes.dense(&passes.list(&codes)), codes);
         for (k, nodes) in field.chunks_exact(shape[0] * shape[1] * shape[2]).enumerate() {
@@ -170,7 +181,7 @@ fn encoded_nodes_are_those_of_the_format() {
         let mut codes = vec![99; codes_in(&pyramid, shape)];
         let mut field = vec![f64::NAN; shape.iter().product()];
         let size = [outer[0], outer[1], outer[2]];
-        assert!(passes.encode(0.7, Nodes { values: &source, size }, None, &mut field, &mut codes));
+        assert!(passes.encode(0.7, Nodes { values: &source, size, marked: None }, None, &mut field, &mut codes));
         let mut expected = Vec::new();
         let decoded = twin(&pyramid, shape, |(pass, at), _, p| {
             let step = pyramid.step(0.7, pass.level);
@@ -182,8 +193,9 @@ fn encoded_nodes_are_those_of_the_format() {
         assert_eq!(bits(&field), bits(&decoded), "{pyramid:?} {shape:?}");
         assert_eq!(codes, expected);
         let listed = passes.list(&codes);
-        let coded = passes.changes(&passes.coded(&listed), 0.7, &listed, None, &field);
-        let changes = passes.changes(&[true; PARTS], 0.7, &listed, None, &field);
+        let marked = passes.marked::<f64>(&listed, None);
+        let coded = passes.changes(&passes.coded(&listed), 0.7, &listed, None, &field, &marked);
+        let changes = passes.changes(&[true; PARTS], 0.7, &listed, None, &field, &marked);
         for part in 0..PARTS {
             let rest = twin_decoded(&pyramid, shape, 0.7, &codes, part);
             let largest = rest.iter().zip(&field).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
@@ -211,7 +223,13 @@ fn codes_that_do_not_fit_are_noticed() {
     for (largest, fits) in [(1e9, true), (2e9, false), (-1e9, true), (-2e9, false), (f64::INFINITY, false)] {
         let source = [0.0, largest, 1.0];
         assert_eq!(
-            passes.encode(1.0, Nodes { values: &source, size: [3, 1, 1] }, None, &mut [0.0; 3], &mut [0; 3]),
+            passes.encode(
+                1.0,
+                Nodes { values: &source, size: [3, 1, 1], marked: None },
+                None,
+                &mut [0.0; 3],
+                &mut [0; 3]
+            ),
             fits,
             "{largest}"
         );
@@ -258,7 +276,7 @@ fn coarse_lattices_have_the_nodes_of_all_passes() {
             let read = coarse_codes(&whole, &passes, &codes, lod);
             let [x, y, z, k] = passes.nodes();
             let mut coarse = vec![f64::NAN; x * y * z * k];
-            passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse);
+            put_zeros(&passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse), &mut coarse);
             for (i, found) in coarse.iter().enumerate() {
                 let at = [i % x, i / x % y, i / (x * y) % z].map(|node| node << lod);
                 let k = i / (x * y * z);
@@ -283,6 +301,7 @@ fn some_ks_have_the_nodes_of_all_passes() {
         let (mut some, sparse) = (vec![f64::NAN; x * y * z * k], passes.list(&codes));
         let marked = passes.decode_some(&wanted, 0.3, &sparse, None, &mut some);
         assert_eq!(marked, passes.marked::<f64>(&sparse, None));
+        put_zeros(&marked, &mut some);
         let whole = twin_decoded(&pyramid, [x, y, z, k], 0.3, &codes, PARTS);
         let of_k = |nodes: &[f64], k: usize| bits(&nodes[k * x * y * z..][..x * y * z]);
         for k in 0..k {

@@ -1,6 +1,6 @@
 //! Compares blocks of tiers with a slow twin that follows `FORMAT.md`, section 8, node by node, in the positions of voxels.
 
-use super::tests::{below, bits, coarse_codes, some_codes};
+use super::tests::{below, bits, coarse_codes, put_zeros, some_codes};
 use super::*;
 use std::collections::HashMap;
 use wavesplat_format::{Packing, Stencil};
@@ -139,19 +139,37 @@ impl Case {
     }
 
     /// The nodes of a random block above that lie in the block: as they are cut out of it, with their number along x, y, z, and
-    /// each at its place. None in the last tier.
-    fn known(&self, state: &mut u64) -> (Vec<f64>, [usize; 3], HashMap<Node, f64>) {
+    /// each at its place. None in the last tier. Some k have none, and then arbitrary values.
+    fn known(&self, state: &mut u64) -> Known {
         let (n, outer) = (2 << self.tier, self.outer());
         let start: [usize; 3] = std::array::from_fn(|_| below(4, state));
         let own = std::array::from_fn(|a| outer[a].div_ceil(n));
         let [nx, ny, nz]: [usize; 3] = std::array::from_fn(|a| start[a] + own[a] + below(3, state));
-        let nodes: Vec<f64> = (0..nx * ny * nz * self.ks).map(|_| below(1000, state) as f64 / 9.0).collect();
-        let at =
-            |[x, y, z, k]: Node| nodes[start[0] + x / n + nx * (start[1] + y / n + ny * (start[2] + z / n + nz * k))];
+        let marked: Vec<bool> = (0..self.ks).map(|_| below(4, state) > 0).collect();
+        let node = |i: usize, value: usize| if marked[i / (nx * ny * nz)] { value as f64 / 9.0 } else { f64::NAN };
+        let nodes: Vec<f64> = (0..nx * ny * nz * self.ks).map(|i| node(i, below(1000, state))).collect();
+        let at = |[x, y, z, k]: Node| {
+            let place = start[0] + x / n + nx * (start[1] + y / n + ny * (start[2] + z / n + nz * k));
+            if marked[k] { nodes[place] } else { 0.0 }
+        };
         let known = self.lattice([0; 4], [n, n, n, 1], outer).into_iter().map(|node| (node, at(node))).collect();
         let mut cut = vec![f64::NAN; own.iter().product::<usize>() * self.ks];
-        Nodes { values: &nodes, size: [nx, ny, nz] }.copy(start, own, &mut cut);
-        (cut, own, if self.is_last() { HashMap::new() } else { known })
+        Nodes { values: &nodes, size: [nx, ny, nz], marked: Some(&marked) }.copy(start, own, &mut cut);
+        Known { cut, own, marked, nodes: if self.is_last() { HashMap::new() } else { known } }
+    }
+}
+
+/// The known nodes of a block: as they are cut out of the block above, and each at its place.
+struct Known {
+    cut: Vec<f64>,
+    own: [usize; 3],
+    marked: Vec<bool>,
+    nodes: HashMap<Node, f64>,
+}
+
+impl Known {
+    fn nodes(&self) -> Nodes<'_, f64> {
+        Nodes { values: &self.cut, size: self.own, marked: Some(&self.marked) }
     }
 }
 
@@ -160,14 +178,15 @@ fn blocks_of_tiers_decode_as_the_format_says() {
     let state = &mut 17;
     for _ in 0..3000 {
         let case = Case::random(state);
-        let (nodes, size, known) = case.known(state);
-        let of = (!case.is_last()).then_some(Nodes { values: &nodes, size });
+        let known = case.known(state);
+        let of = (!case.is_last()).then_some(known.nodes());
+        let known = &known.nodes;
         let passes = case.passes();
         let listed = passes.list(&some_codes(passes.codes(), state));
         let codes = passes.dense(&listed);
         let mut field = vec![f64::NAN; passes.nodes().iter().product()];
-        passes.decode_some(&vec![true; case.ks], 0.3, &listed, of, &mut field);
-        let twin = case.twin(&known, |level, _, code, p| p + f64::from(codes[code]) * case.pyramid.step(0.3, level));
+        put_zeros(&passes.decode_some(&vec![true; case.ks], 0.3, &listed, of, &mut field), &mut field);
+        let twin = case.twin(known, |level, _, code, p| p + f64::from(codes[code]) * case.pyramid.step(0.3, level));
         let what = format!("{:?} {:?} {} {}", case.pyramid, case.size, case.ks, case.tier);
         assert_eq!(bits(&field), bits(&twin), "{what}");
         if !case.pyramid.order.contains(&Axis::T) {
@@ -185,18 +204,19 @@ fn blocks_of_tiers_are_encoded_as_the_format_says() {
     let state = &mut 19;
     for _ in 0..2000 {
         let case = Case::random(state);
-        let (nodes, size, known) = case.known(state);
-        let of = (!case.is_last()).then_some(Nodes { values: &nodes, size });
+        let known = case.known(state);
+        let of = (!case.is_last()).then_some(known.nodes());
+        let known = &known.nodes;
         let passes = case.passes();
         let n = 1 << case.tier;
         let [x, y, z, _] = case.outer().map(|extent| extent.div_ceil(n));
         let source: Vec<f64> = (0..x * y * z * case.ks).map(|_| below(1000, state) as f64 / 70.0).collect();
         let mut codes = vec![99; passes.codes()];
         let mut field = vec![f64::NAN; passes.nodes().iter().product()];
-        let of_source = Nodes { values: &source, size: [x, y, z] };
+        let of_source = Nodes { values: &source, size: [x, y, z], marked: None };
         assert!(passes.encode(0.7, of_source, of, &mut field, &mut codes));
         let mut expected = vec![0; codes.len()];
-        let twin = case.twin(&known, |level, [i, j, l, k], code, p| {
+        let twin = case.twin(known, |level, [i, j, l, k], code, p| {
             let step = case.pyramid.step(0.7, level);
             let q = ((source[i / n + x * (j / n + y * (l / n + z * k))] - p) * (1.0 / step)).round_ties_even();
             expected[code] = q as i32;
@@ -220,13 +240,13 @@ fn coarse_lattices_of_the_last_tier_have_the_nodes_of_all_passes() {
         let codes = whole.dense(&listed);
         let [nx, ny, nz, ks] = whole.nodes();
         let mut field = vec![f64::NAN; nx * ny * nz * ks];
-        whole.decode_some(&vec![true; ks], 0.3, &listed, None, &mut field);
+        put_zeros(&whole.decode_some(&vec![true; ks], 0.3, &listed, None, &mut field), &mut field);
         for lod in 1..4 {
             let passes = PredictionPasses::with_detail(&case.pyramid, case.size, ks, case.tier, lod);
             let read = coarse_codes(&whole, &passes, &codes, lod);
             let [x, y, z, k] = passes.nodes();
             let mut coarse = vec![f64::NAN; x * y * z * k];
-            passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse);
+            put_zeros(&passes.decode_some(&vec![true; k], 0.3, &read, None, &mut coarse), &mut coarse);
             for (i, found) in coarse.iter().enumerate() {
                 let at = [i % x, i / x % y, i / (x * y) % z].map(|node| node << lod);
                 let expected = field[at[0] + nx * (at[1] + ny * (at[2] + nz * (i / (x * y * z))))];
