@@ -15,18 +15,18 @@ pub struct BlockWithGhosts {
 }
 
 /// Samples of a caller, or a copy of some.
-pub(super) enum Samples<'a> {
+pub(super) enum MaybeCopied<'a> {
     Lent(&'a [u8]),
-    Own(Buffer<u8>),
+    Copied(Buffer<u8>),
 }
 
-impl Deref for Samples<'_> {
+impl Deref for MaybeCopied<'_> {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
         match self {
             Self::Lent(samples) => samples,
-            Self::Own(samples) => samples,
+            Self::Copied(samples) => samples,
         }
     }
 }
@@ -40,18 +40,18 @@ impl From<[usize; 3]> for BlockWithGhosts {
 
 impl BlockWithGhosts {
     /// The samples of the block alone, frame by frame.
-    pub(super) fn own<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Samples<'a> {
+    pub(super) fn own<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> MaybeCopied<'a> {
         match self.known == self.size {
-            true => Samples::Lent(samples),
-            false => Samples::Own(copied(codec, samples, self.size, self.known, self.size)),
+            true => MaybeCopied::Lent(samples),
+            false => MaybeCopied::Copied(copied(codec, samples, self.size, self.known, self.size)),
         }
     }
 
     /// The samples of `outer` voxels along x, y, z, at least as many as are known. Beyond the known voxels, the last
     /// two planes are extrapolated linearly.
-    pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> Samples<'a> {
+    pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> MaybeCopied<'a> {
         if self.known == outer {
-            return Samples::Lent(samples);
+            return MaybeCopied::Lent(samples);
         }
         let mut known = self.known;
         let mut extended = copied(codec, samples, known, known, outer);
@@ -61,14 +61,14 @@ impl BlockWithGhosts {
                 known[axis] += 1;
             }
         }
-        Samples::Own(extended)
+        MaybeCopied::Copied(extended)
     }
 
     /// The nodes of a block of a tier above 0, from what is known: those in the volume and, along axes that have a node behind it,
     /// the volume's last two planes of voxels. Those are extrapolated as for the blocks below.
-    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> Samples<'a> {
+    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> MaybeCopied<'a> {
         if self.known == self.size {
-            return Samples::Lent(samples);
+            return MaybeCopied::Lent(samples);
         }
         let mut known = self.known;
         let mut nodes = Buffer::from(samples);
@@ -78,7 +78,7 @@ impl BlockWithGhosts {
                 known[axis] -= 1;
             }
         }
-        Samples::Own(copied(codec, &nodes, self.size, self.known, self.size))
+        MaybeCopied::Copied(copied(codec, &nodes, self.size, self.known, self.size))
     }
 }
 

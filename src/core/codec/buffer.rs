@@ -1,12 +1,13 @@
 //! Large buffers that are reused: fresh memory from the system costs about as much as decoding a block into it.
 
+use super::codes::PooledCodes;
 use crate::base::zeroed::{Pod, Zeroed};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
 /// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. A buffer takes
 /// a spare one of at most twice its length, so the pool holds no more than buffers of each size and its half had at one time. Only
-/// blocks use buffers, so their sizes are few.
+/// blocks and boxes of trials use buffers, so their sizes are few.
 #[derive(Debug, Default)]
 pub struct Buffer<T: Pooled> {
     /// At least `len` values; the rest has been used before.
@@ -23,7 +24,16 @@ impl<T: Pooled> Buffer<T> {
             (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len())).min_by_key(|n| spare[*n].len());
         let values = fits.map(|n| spare.swap_remove(n));
         drop(spare);
-        Self { values: values.unwrap_or_else(|| Zeroed::new(len)), len }
+        let mut values = values.unwrap_or_else(|| Zeroed::new(len));
+        if cfg!(debug_assertions) {
+            bytemuck::cast_slice_mut::<T, u8>(&mut values).fill(0xFF); // NaN and -1: nobody may rely on zeros
+        }
+        Self { values, len }
+    }
+
+    /// Bytes of memory that it takes: it may be longer than what is used of it.
+    pub fn held_bytes(&self) -> usize {
+        size_of_val(&self.values[..])
     }
 
     /// Gives the memory back, and takes some for `len` entries with arbitrary values.
@@ -88,12 +98,14 @@ pub trait Pooled: Pod + Default {
 /// Returns the memory of all unused buffers to the system.
 pub fn release_spare() {
     fn release<T: Pooled>() {
-        *spare::<T>() = Vec::new();
+        let unused = std::mem::take(&mut *spare::<T>());
+        drop(unused); // others may take buffers meanwhile
     }
     release::<u8>();
     release::<i32>();
     release::<f32>();
     release::<f64>();
+    PooledCodes::release_spare();
 }
 
 macro_rules! pooled {

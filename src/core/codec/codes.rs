@@ -15,6 +15,11 @@ pub struct PooledCodes(SparseCodes);
 static SPARE: Mutex<Vec<SparseCodes>> = Mutex::new(Vec::new());
 
 impl PooledCodes {
+    /// Returns the memory of unused codes to the system.
+    pub(super) fn release_spare() {
+        *SPARE.lock().unwrap_or_else(PoisonError::into_inner) = Vec::new();
+    }
+
     pub(super) fn new() -> Self {
         let spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut codes = spare.unwrap_or_default();
@@ -72,7 +77,7 @@ impl Codes {
     /// Bytes of memory that the codes take.
     pub(super) fn held_bytes(&self) -> usize {
         match self {
-            Self::Dense(codes) => size_of_val(&codes[..]),
+            Self::Dense(codes) => codes.held_bytes(),
             Self::Sparse(codes) => codes.held_bytes(),
         }
     }

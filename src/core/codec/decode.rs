@@ -301,7 +301,8 @@ impl Block {
             return (0..codec.parts() as u8).map(of_level).collect();
         };
         let passes = codec.passes(pyramid, self.of);
-        let changes = field.changes(&passes, self.step, self.codes.sparse(), self.above.as_ref());
+        // Encoders before left out each k whose nodes are all zero, as a ghost and finer codes can cancel each other.
+        let changes = field.changes(&passes, self.step, self.codes.sparse(), self.above.as_ref(), &field.nonzero());
         changes.iter().map(Change::largest).collect()
     }
 

@@ -26,7 +26,7 @@ use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Listed, PartKind, PartStats};
 use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 
-/// The encoder of one worker; its scratch is reused from block to block.
+/// The encoder of one worker.
 #[derive(Debug)]
 pub struct Encoder {
     compressor: Compressor,
@@ -113,9 +113,9 @@ impl Encoder {
             false => source.refine(pyramid, size, &source, above.map(Above::doubles), &mut double, &mut self.codes),
         };
         let Some(coded) = coded else { return Ok(self.uncoded(codec, id, size, above)) };
-        let ks = codec.basis.coefficients();
-        let field = if pyramid.single { Field::single(single, ks) } else { Field::double(double, ks) };
         let Parts { stats, parts, .. } = self.coded_parts(codec, size, &coded)?;
+        let marked = coded.marked;
+        let field = if pyramid.single { Field::single(single, marked) } else { Field::double(double, marked) };
         Ok((EncodedBlock { id, stats, parts }, field))
     }
 
@@ -151,7 +151,8 @@ impl Encoder {
             dropped += self.keep_codes(&group, step, voxels, first, count);
             block.check(&group, first, count, &mut tally)?;
         }
-        Some(Coded { step, parts: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
+        let marked = Vec::new();
+        Some(Coded { step, marked, parts: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
     }
 
     /// Writes a group's kept codes, k-major. Returns the energy lost by dropping and rounding.
@@ -177,8 +178,11 @@ impl Encoder {
             clear(&mut self.raw);
             let stats = match (&coded.parts, &passes) {
                 (Some(parts), Some((packing, passes))) => {
-                    packing.pack(&passes.part_of(level, &self.codes), &mut self.raw);
-                    parts[usize::from(level)]
+                    let stats = parts[usize::from(level)];
+                    if stats.count > 0 {
+                        packing.pack(&passes.part_of(level, &self.codes), &mut self.raw);
+                    }
+                    stats
                 }
                 _ => {
                     let codes = &self.codes[codec.level_range(level, size)];

@@ -47,7 +47,7 @@ pub struct Above {
 impl Above {
     /// Copies the `size` nodes from `start` on out of the block above, which has `outer` nodes along x, y, z.
     pub fn new(above: &Field<'_>, outer: [usize; 3], start: [usize; 3], size: [usize; 3]) -> Self {
-        Self { nodes: above.cut([outer, start, size]), size }
+        Self { nodes: above.cut(outer, start, size), size }
     }
 
     /// Bytes of memory that they take.
@@ -134,7 +134,7 @@ impl Field<'static> {
         wanted: &[bool],
     ) -> Self {
         if let Some(above) = above.filter(|_| codec.is_all_above()) {
-            return above.nodes.cut([above.size, [0; 3], above.size]);
+            return above.nodes.cut(above.size, [0; 3], above.size);
         }
         let of = Refined { codec, size, step, codes, wanted };
         let (values, marked) = match &codec.scheme.pyramid {
@@ -161,20 +161,20 @@ impl Field<'static> {
         Ok(Self::refined(codec, size, block.stats.step, &codes.unwrap_or_else(PooledCodes::new), above, &all))
     }
 
-    /// The decoded nodes of a block, as its encoder has them, of `ks` coefficients a series.
-    pub(super) fn single(nodes: Buffer<f32>, ks: usize) -> Self {
-        Self { values: Values::Single(nodes), marked: vec![true; ks] }
+    /// The decoded nodes of a block, as its encoder has them, and whether each k may have some that are not zero.
+    pub(super) fn single(nodes: Buffer<f32>, marked: Vec<bool>) -> Self {
+        Self { values: Values::Single(nodes), marked }
     }
 
     /// As [`Self::single`], in 64-bit floats.
-    pub(super) fn double(nodes: Buffer<f64>, ks: usize) -> Self {
-        Self { values: Values::Double(nodes), marked: vec![true; ks] }
+    pub(super) fn double(nodes: Buffer<f64>, marked: Vec<bool>) -> Self {
+        Self { values: Values::Double(nodes), marked }
     }
 }
 
 impl Field<'_> {
-    /// Copies a box: the nodes along x, y, z that there are, the first of the box, and those of the box.
-    fn cut(&self, [outer, start, size]: [[usize; 3]; 3]) -> Field<'static> {
+    /// Copies the `size` nodes from `start` on, of `outer` nodes along x, y, z.
+    fn cut(&self, outer: [usize; 3], start: [usize; 3], size: [usize; 3]) -> Field<'static> {
         fn copy<R: Real>(nodes: Nodes<'_, R>, start: [usize; 3], size: [usize; 3], ks: usize) -> Buffer<R> {
             let mut copy = Buffer::with_len(size.iter().product::<usize>() * ks);
             nodes.copy(start, size, &mut copy);
@@ -193,8 +193,8 @@ impl Field<'_> {
     pub fn held_bytes(&self) -> usize {
         match &self.values {
             Values::Zero | Values::Codes { .. } => 0,
-            Values::Single(values) => size_of_val(&values[..]),
-            Values::Double(values) => size_of_val(&values[..]),
+            Values::Single(values) => values.held_bytes(),
+            Values::Double(values) => values.held_bytes(),
         }
     }
 }
@@ -239,24 +239,46 @@ impl<'a> Field<'a> {
         matches!(self.values, Values::Single(_))
     }
 
-    /// The change from leaving out each level part of a pyramid that has codes, and all finer ones.
+    /// The change from leaving out each level part of a pyramid that has codes, and all finer ones, of the pyramids with a k in
+    /// `marked`. The field has all k.
     pub(super) fn changes(
         &self,
         passes: &PredictionPasses<'_>,
         step: f64,
         codes: &SparseCodes,
         above: Option<&Above>,
+        marked: &[bool],
     ) -> Vec<Change> {
-        let parts = passes.coded(codes);
+        let (parts, [x, y, z, _]) = (passes.coded(codes), passes.nodes());
+        let (size, marked) = ([x, y, z], Some(marked));
         match &self.values {
-            Values::Single(field) => {
-                passes.changes(&parts, step, codes, above.map(Above::singles), field, &self.marked)
+            Values::Single(values) => {
+                let field = Nodes { values, size, marked };
+                passes.changes(&parts, step, codes, above.map(Above::singles), field)
             }
-            Values::Double(field) => {
-                passes.changes(&parts, step, codes, above.map(Above::doubles), field, &self.marked)
+            Values::Double(values) => {
+                let field = Nodes { values, size, marked };
+                passes.changes(&parts, step, codes, above.map(Above::doubles), field)
             }
             Values::Zero | Values::Codes { .. } => vec![Change::default(); PARTS],
         }
+    }
+
+    /// Whether each k may have coefficients that are not zero.
+    pub(super) fn marked(&self) -> &[bool] {
+        &self.marked
+    }
+
+    /// Whether each k has coefficients that are not zero.
+    pub(super) fn nonzero(&self) -> Vec<bool> {
+        let each = |all: usize| all / self.marked.len().max(1);
+        let of_k = |k: usize| match &self.values {
+            Values::Single(values) => !rows::is_zero(&values[k * each(values.len())..][..each(values.len())]),
+            Values::Double(values) => !rows::is_zero(&values[k * each(values.len())..][..each(values.len())]),
+            Values::Zero => false,
+            Values::Codes { .. } => true,
+        };
+        self.marked.iter().enumerate().map(|(k, marked)| *marked && of_k(k)).collect()
     }
 
     /// Copies coefficients of one k from voxel `voxel` on.
@@ -325,7 +347,7 @@ impl<'a> Field<'a> {
     pub(super) fn series(&self, basis: &dyn TimeBasis, voxels: usize, voxel: usize) -> Vec<f64> {
         let mut work = vec![Lane::default(); basis.coefficients()];
         let mut series = vec![Lane::default(); basis.frames()];
-        work.iter_mut().enumerate().for_each(|(k, lane)| lane[0] = self.at(k * voxels + voxel));
+        work.iter_mut().enumerate().for_each(|(k, lane)| self.load(k, voxels, voxel, &mut lane[..1]));
         basis.inverse(&mut work, &mut series);
         series.iter().map(|lane| lane[0]).collect()
     }
@@ -338,7 +360,7 @@ pub(super) struct Used {
 }
 
 impl Used {
-    /// Creates it from marks. All coefficients of unmarked k must be zero.
+    /// Creates it from marks. All coefficients of unmarked k count as zero.
     pub(super) fn new(basis: &dyn TimeBasis, marked: &[bool]) -> Self {
         let basis = basis.only(marked);
         let ks = (0..marked.len()).filter(|k| basis.is_none() || marked[*k]).collect();
@@ -427,8 +449,7 @@ impl Refined<'_> {
             return (Values::Zero, vec![false; ks]);
         }
         let mut field = Buffer::with_len(nodes.iter().product::<usize>() * ks);
-        let mut marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
-        marked.iter_mut().zip(wanted).for_each(|(marked, wanted)| *marked &= *wanted);
-        (values(field), marked)
+        let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
+        (if marked.contains(&true) { values(field) } else { Values::Zero }, marked)
     }
 }

@@ -23,6 +23,8 @@ use wavesplat_format::{Basis, Outliers, PartStats, Pyramid};
 /// The result of coding the series of a block.
 pub(super) struct Coded {
     pub(super) step: f64,
+    /// With a pyramid, whether each k may have nodes that are not zero.
+    pub(super) marked: Vec<bool>,
     /// With a pyramid, for each level part the number of its codes, and the change from leaving out it and all finer ones.
     pub(super) parts: Option<Vec<PartStats>>,
     pub(super) dropped: f64,
@@ -33,6 +35,8 @@ pub(super) struct Coded {
 /// The codes of a block that are not zero, and how the field that they give compares with the source.
 struct Checked {
     listed: PooledCodes,
+    /// Whether each k of the field may have nodes that are not zero.
+    marked: Vec<bool>,
     /// None if too many samples miss the bound.
     tally: Option<Tally>,
 }
@@ -111,15 +115,15 @@ impl Source<'_> {
                 }
             }
         }
-        let Checked { listed, tally } = checked;
+        let Checked { listed, marked, tally } = checked;
         let mut tally = tally?;
         let outliers = tally.take_outliers(self.codec, self.samples);
-        let marked = passes.marked(&listed, known);
+        let field = Nodes { values: field, size, marked: Some(&marked) };
         // The directory lists no other parts.
-        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field, &marked);
+        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field);
         let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
-        Some(Coded { step, parts, dropped: tally.squared_error, outliers, tally })
+        Some(Coded { step, marked, parts, dropped: tally.squared_error, outliers, tally })
     }
 
     /// The block with zeros in place of the nodes above and its own, if its samples are within the bound of that.
@@ -139,7 +143,8 @@ impl Source<'_> {
         let tally = self.checked(weighing, passes, None, field, &codes).tally?;
         let parts = Some(vec![PartStats { count: 0, energy: 0.0, largest: 0.0 }; self.codec.parts()]);
         let (dropped, outliers) = (tally.squared_error, Outliers::default());
-        tally.outliers.is_empty().then_some(Coded { step: 0.0, parts, dropped, outliers, tally })
+        let marked = Vec::new();
+        tally.outliers.is_empty().then_some(Coded { step: 0.0, marked, parts, dropped, outliers, tally })
     }
 
     /// Compares the field that codes give with the source.
@@ -152,12 +157,13 @@ impl Source<'_> {
         codes: &[i32],
     ) -> Checked {
         let listed = passes.list(codes);
+        let marked = passes.marked(&listed, known);
         let tally = match self.plain() {
             _ if self.codec.tier > 0 => Some(Tally::new()), // its samples are stored with the blocks below
             true => self.check_samples(field),
-            false => self.check_series(weighing, field, &passes.marked(&listed, known)),
+            false => self.check_series(weighing, field, &marked),
         };
-        Checked { listed, tally }
+        Checked { listed, marked, tally }
     }
 
     /// The step of the finest level. None if the block must be stored exactly.

@@ -51,7 +51,7 @@ impl Encoder {
         let listed = passes.list(codes);
         let all = vec![true; codec.basis.coefficients()];
         let field = Field::refined(codec, size, step, &listed, None, &all);
-        let changes = field.changes(&passes, step, &listed, None);
+        let changes = field.changes(&passes, step, &listed, None, field.marked());
         let mut parts = Vec::new();
         for (part, change) in (0..).zip(&changes) {
             let count = passes.count(part, &listed);

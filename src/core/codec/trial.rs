@@ -1,7 +1,7 @@
 //! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
 
 use super::WindowCodec;
-use super::block_with_ghosts::{BlockWithGhosts, Samples};
+use super::block_with_ghosts::{BlockWithGhosts, MaybeCopied};
 use super::buffer::Buffer;
 use super::encode::listed;
 use super::error_weights::QuantizerSetup;
@@ -14,7 +14,7 @@ use wavesplat_format::Pyramid;
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
 pub struct Trial<'a, R: Real> {
     size: [usize; 3],
-    samples: Samples<'a>,
+    samples: MaybeCopied<'a>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
     /// The nodes of the box, and the nodes beyond it that may predict them.

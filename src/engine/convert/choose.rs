@@ -19,6 +19,7 @@ use wavesplat_core::base::sample::{self, SampleType};
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};
+use wavesplat_core::codec::buffer;
 use wavesplat_core::codec::real::Real;
 use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use wavesplat_core::codec::trial::Trial;
@@ -94,7 +95,9 @@ impl SchemeSelector<'_> {
             let coarseness = self.coarseness(COARSE);
             return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
-        if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() }
+        let smallest = if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() };
+        buffer::release_spare(); // those of trials are too small for blocks
+        smallest
     }
 
     /// The smallest of all families with a pyramid and their variants.

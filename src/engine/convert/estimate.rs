@@ -17,7 +17,7 @@ use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::range_bound;
-use wavesplat_core::codec::buffer::Buffer;
+use wavesplat_core::codec::buffer::{self, Buffer};
 use wavesplat_core::codec::encode::Encoded;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan_frame};
@@ -115,7 +115,9 @@ pub fn estimates(
         let bytes = bytes as u64;
         Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks: blocks.len(), windows: windows.len() })
     };
-    let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>()?;
+    let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>();
+    buffer::release_spare();
+    let estimates = estimates?;
     progress.finish();
     Ok(estimates)
 }

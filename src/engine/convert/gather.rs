@@ -13,7 +13,7 @@ use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec::bound::{self, Bound, ErrorBound};
-use wavesplat_core::codec::buffer::{self, Buffer};
+use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan};
 use wavesplat_core::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
@@ -244,7 +244,6 @@ impl<'a> WindowReader<'a> {
             before,
         };
         let mut codec = selector.choose()?;
-        buffer::release_spare(); // boxes of trials are smaller than blocks
         self.scheme = Some(Scheme::clone(&codec.scheme));
         codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
         self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));

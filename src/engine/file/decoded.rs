@@ -128,7 +128,7 @@ impl DecodedBlocks {
 
     /// Keeps samples if there is room.
     pub(super) fn keep_samples(&self, key: DecodedKey, samples: &Arc<Buffer<u8>>) {
-        self.kept().put(key, Decoded::Samples(samples.clone()), samples.len(), self.room);
+        self.kept().put(key, Decoded::Samples(samples.clone()), samples.held_bytes(), self.room);
     }
 }
 

@@ -12,19 +12,20 @@ pub(crate) struct Nodes<'a, R> {
     pub(crate) values: &'a [R],
     /// Their number along x, y, z.
     pub(crate) size: [usize; 3],
-    /// Whether each k has nodes that are not zero; the values of others are arbitrary. `None` if all may have some.
+    /// Whether each k may have nodes that are not zero; the values of others are arbitrary. `None` if all may.
     pub(crate) marked: Option<&'a [bool]>,
 }
 
 impl<R: Real> Nodes<'_, R> {
-    /// Whether all nodes of some k are zero.
+    /// Whether all nodes of all these k are zero.
     pub(super) fn is_zero(&self, mut ks: Range<usize>) -> bool {
         let each: usize = self.size.iter().product();
         let nodes = |k: usize| self.values.get(k * each..(k + 1) * each).unwrap_or_default();
         ks.all(|k| !self.has(k) || rows::is_zero(nodes(k)))
     }
 
-    fn has(&self, k: usize) -> bool {
+    /// Whether a k may have nodes that are not zero.
+    pub(super) fn has(&self, k: usize) -> bool {
         self.marked.is_none_or(|marked| marked[k])
     }
 

@@ -214,9 +214,9 @@ impl<'a> PredictionPasses<'a> {
         Ok(codes)
     }
 
-    /// Decodes every k that `wanted` marks into the field. `codes` are all codes of the block, as
-    /// [`Self::placed_boxes`] places them. Returns for each k whether some node is not zero; if k is refined, the same
-    /// for all of them. Leaves the nodes of every other k as they are.
+    /// Decodes every k that `wanted` marks into the field. `codes` are all codes of the block, as [`Self::placed_boxes`] places them.
+    /// Returns which k were decoded: those wanted with a node that may not be zero. Leaves the nodes of other k as they are; if k is
+    /// refined, with arbitrary values.
     pub(crate) fn decode_some<R: Real>(
         &self,
         wanted: &[bool],
@@ -225,31 +225,43 @@ impl<'a> PredictionPasses<'a> {
         known: Option<Nodes<'_, R>>,
         field: &mut [R],
     ) -> Vec<bool> {
-        let marked = self.marked(codes, known);
+        let mut marked = self.marked(codes, known);
         let pyramids = field.chunks_exact_mut(self.pyramid_nodes());
         for ((number, nodes), wanted) in pyramids.enumerate().zip(wanted.chunks_exact(self.shape[3])) {
             if marked[number * self.shape[3]] && wanted.contains(&true) {
                 self.stages.refine(wanted, nodes, &mut self.sparse(number, step, codes, known, PARTS));
             }
         }
+        marked.iter_mut().zip(wanted).for_each(|(marked, wanted)| *marked &= *wanted);
         marked
     }
 
     /// For each k, whether some code or known node is not zero; if k is refined, the same for all of them.
     pub(crate) fn marked<R: Real>(&self, codes: &SparseCodes, known: Option<Nodes<'_, R>>) -> Vec<bool> {
-        let some = (0..self.pyramids).map(|number| self.is_marked(number, codes, known));
+        let runs = self.runs();
+        let some = (0..self.pyramids).map(|number| self.is_marked(number, codes, &runs, known));
         some.flat_map(|some| std::iter::repeat_n(some, self.shape[3])).collect()
     }
 
-    /// Whether some code or known node of the pyramid with this number is not zero.
-    fn is_marked<R: Real>(&self, number: usize, codes: &SparseCodes, known: Option<Nodes<'_, R>>) -> bool {
-        let ks = number * self.shape[3]..(number + 1) * self.shape[3];
-        let has_codes = |(_, runs): (_, Range<usize>)| {
+    /// The k of the pyramid with this number.
+    fn ks(&self, number: usize) -> Range<usize> {
+        number * self.shape[3]..(number + 1) * self.shape[3]
+    }
+
+    /// Whether some code or known node of the pyramid with this number is not zero. `runs` are all runs of codes.
+    fn is_marked<R: Real>(
+        &self,
+        number: usize,
+        codes: &SparseCodes,
+        runs: &[Range<usize>],
+        known: Option<Nodes<'_, R>>,
+    ) -> bool {
+        let has_codes = |(_, runs): (_, &Range<usize>)| {
             let each = runs.len() / self.pyramids;
             (0..each).any(|n| !codes.run(runs.start + number * each + n).1.is_empty())
         };
-        known.is_some_and(|known| !known.is_zero(ks))
-            || self.boxes.iter().zip(self.runs()).filter(|(of, _)| of.of.is_some()).any(has_codes)
+        self.boxes.iter().zip(runs).filter(|(of, _)| of.of.is_some()).any(has_codes)
+            || known.is_some_and(|known| !known.is_zero(self.ks(number)))
     }
 
     /// As [`Self::marked`], from all codes, pass after pass.
@@ -268,7 +280,7 @@ impl<'a> PredictionPasses<'a> {
         known: Option<Nodes<'_, R>>,
         nodes: &mut Vec<R>,
     ) -> bool {
-        let some = self.is_marked(k, codes, known);
+        let some = self.is_marked(k, codes, &self.runs(), known);
         if some {
             nodes.resize(self.pyramid_nodes(), R::default());
             self.stages.refine(&[true], nodes, &mut self.sparse(k, step, codes, known, PARTS));
@@ -281,8 +293,8 @@ impl<'a> PredictionPasses<'a> {
         self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
     }
 
-    /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed;
-    /// `split` is scratch. NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass.
+    /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed.
+    /// NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass.
     pub(crate) fn encode<R: Real>(
         &self,
         step: f64,
@@ -328,24 +340,23 @@ impl<'a> PredictionPasses<'a> {
         std::array::from_fn(|part| self.count(part as u8, codes) > 0)
     }
 
-    /// The changes of a decoded field, whose other k than the marked ones are zero, from leaving out each part of `parts` and all
-    /// finer ones.
+    /// The changes of a field from leaving out each part of `parts` and all finer ones. All k of the field are decoded; those that it
+    /// does not mark are zero.
     pub(crate) fn changes<R: Real>(
         &self,
         parts: &[bool; PARTS],
         step: f64,
         codes: &SparseCodes,
         known: Option<Nodes<'_, R>>,
-        field: &[R],
-        marked: &[bool],
+        field: Nodes<'_, R>,
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
         if !parts.contains(&true) {
             return changes;
         }
         let mut rest = Buffer::with_len(self.pyramid_nodes());
-        let pyramids = field.chunks_exact(self.pyramid_nodes()).enumerate();
-        for (number, nodes) in pyramids.filter(|(number, _)| marked[number * self.shape[3]]) {
+        let pyramids = field.values.chunks_exact(self.pyramid_nodes()).enumerate();
+        for (number, nodes) in pyramids.filter(|(number, _)| self.ks(*number).any(|k| field.has(k))) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| parts[*part]) {
                 if part == 0 && !self.has_known() {
                     dispatch!(add_changes_to_zero(change, nodes));

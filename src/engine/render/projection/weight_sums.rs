@@ -76,7 +76,10 @@ impl<'a> WeightSums<'a> {
             let reference = |clip: &Region| ReferenceWeights::new(&setup.camera, &setup.grid, *clip, config.kernel);
             let boxes = boxes.iter().map(reference).collect::<Result<Vec<_>>>()?;
             let uncut = |pixel: [usize; 2]| boxes.iter().map(|voxels| voxels.at(pixel)).sum();
-            self.judge_background(&uncut, setup.stated_error * reference(&setup.clip)?.most());
+            // The error of a quick look is an estimate for samples of any kind; weights vary less.
+            let is_estimate = config.fast && setup.backend.is_lattice();
+            let near = if is_estimate { 0.0 } else { setup.stated_error * reference(&setup.clip)?.most() };
+            self.judge_background(&uncut, near);
         }
         Ok(self)
     }
