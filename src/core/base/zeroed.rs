@@ -27,6 +27,11 @@ impl<T: Pod> Zeroed<T> {
         let _ = map.advise(memmap2::Advice::HugePage); // advice only: a system without huge pages is slower
         Self::Map(map, len)
     }
+
+    /// Sets every byte of all numbers.
+    pub fn fill_bytes(&mut self, byte: u8) {
+        bytemuck::cast_slice_mut::<T, u8>(self).fill(byte);
+    }
 }
 
 impl<T> Default for Zeroed<T> {

@@ -1,6 +1,5 @@
 //! Large buffers that are reused: fresh memory from the system costs about as much as decoding a block into it.
 
-use super::codes::PooledCodes;
 use crate::base::zeroed::{Pod, Zeroed};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
@@ -26,7 +25,7 @@ impl<T: Pooled> Buffer<T> {
         drop(spare);
         let mut values = values.unwrap_or_else(|| Zeroed::new(len));
         if cfg!(debug_assertions) {
-            bytemuck::cast_slice_mut::<T, u8>(&mut values).fill(0xFF); // NaN and -1: nobody may rely on zeros
+            values.fill_bytes(0xFF); // NaN and -1: nobody may rely on zeros
         }
         Self { values, len }
     }
@@ -96,7 +95,7 @@ pub trait Pooled: Pod + Default {
 }
 
 /// Returns the memory of all unused buffers to the system.
-pub fn release_spare() {
+pub(super) fn release_spare() {
     fn release<T: Pooled>() {
         let unused = std::mem::take(&mut *spare::<T>());
         drop(unused); // others may take buffers meanwhile
@@ -105,7 +104,6 @@ pub fn release_spare() {
     release::<i32>();
     release::<f32>();
     release::<f64>();
-    PooledCodes::release_spare();
 }
 
 macro_rules! pooled {

@@ -29,14 +29,19 @@ mod truncate;
 
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{ErrorBound, difference_up};
-pub use load::load_lanes;
-
 use crate::wavelet::{self, LANES, TimeBasis};
+pub use load::load_lanes;
 use pyramid::PredictionPasses;
 use scheme::Scheme;
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
+
+/// Returns the memory of all unused buffers and codes to the system.
+pub fn release_spare() {
+    buffer::release_spare();
+    codes::PooledCodes::release_spare();
+}
 
 /// What coding and decoding share for all blocks of one window.
 #[derive(Debug, Clone)]

@@ -16,13 +16,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
-use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};
-use wavesplat_core::codec::buffer;
 use wavesplat_core::codec::real::Real;
 use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use wavesplat_core::codec::trial::Trial;
+use wavesplat_core::codec::{self, WindowCodec};
 use wavesplat_core::source::{Archive, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Basis;
 use wavesplat_format::Packing;
@@ -96,7 +95,7 @@ impl SchemeSelector<'_> {
             return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
         let smallest = if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() };
-        buffer::release_spare(); // those of trials are too small for blocks
+        codec::release_spare(); // those of trials are too small for blocks
         smallest
     }
 

@@ -15,9 +15,10 @@ use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{self, join_ranges};
+use wavesplat_core::codec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::range_bound;
-use wavesplat_core::codec::buffer::{self, Buffer};
+use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::encode::Encoded;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan_frame};
@@ -116,7 +117,7 @@ pub fn estimates(
         Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks: blocks.len(), windows: windows.len() })
     };
     let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>();
-    buffer::release_spare();
+    codec::release_spare();
     let estimates = estimates?;
     progress.finish();
     Ok(estimates)

@@ -62,10 +62,10 @@ use wavesplat_core::base::description::{Description, is_of};
 use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::memory;
 use wavesplat_core::base::progress::Progress;
-use wavesplat_core::codec::WindowCodec;
 pub use wavesplat_core::codec::bound::{Bound, range_bound};
-use wavesplat_core::codec::buffer::{self, Buffer};
+use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::encode::{Encoded, Encoder};
+use wavesplat_core::codec::{self, WindowCodec};
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{Archive, ColourTransform, FrameSource};
 pub use wavesplat_format::{Basis, Packing, Stencil};
@@ -316,7 +316,7 @@ pub fn convert_into<W: Write>(
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
     });
-    buffer::release_spare();
+    codec::release_spare();
     let ((read, findings), encoding) = ran?;
     let report = writer.finish(started, read, &findings, encoding)?;
     progress.finish();

@@ -2,7 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use wavesplat_core::codec::buffer::{self, Buffer};
+use wavesplat_core::codec;
+use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::Field;
 use wavesplat_format::{BlockId, PartKind};
@@ -136,7 +137,7 @@ impl Drop for DecodedBlocks {
     /// Returns the memory to the system: buffers that are dropped go to a pool.
     fn drop(&mut self) {
         self.kept().entries.clear();
-        buffer::release_spare();
+        codec::release_spare();
     }
 }
 
