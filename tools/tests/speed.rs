@@ -43,7 +43,7 @@ fn every_command_has_a_row_for_both_builds() {
         .collect();
     assert_eq!(rows.len(), 2 * 21);
     let is_number = |cell: &&str| cell.trim_end_matches(" |").parse::<f64>().is_ok_and(f64::is_finite);
-    assert!(rows.iter().all(|row| row.len() == 5 && row[2..].iter().all(|cell| is_number(&cell))), "{text}");
+    assert!(rows.iter().all(|row| row.len() == 5 && row[2..].iter().all(is_number)), "{text}");
     let [log, other_log] = [own, other].map(|folder| fs::read_to_string(folder.join("log")).unwrap());
     for log in [&log, &other_log] {
         assert_eq!(log.lines().count(), 2 * (1 + 2 * 21), "the conversion of the file, and two rounds");
