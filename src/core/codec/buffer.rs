@@ -25,7 +25,7 @@ impl<T: Pooled> Buffer<T> {
         drop(spare);
         let mut values = values.unwrap_or_else(|| Zeroed::new(len));
         if cfg!(debug_assertions) {
-            values.fill_bytes(0xFF); // NaN and -1: nobody may rely on zeros
+            values.fill_bytes(0xFF); // tests then fail if they use a value that was not written: NaN or -1
         }
         Self { values, len }
     }

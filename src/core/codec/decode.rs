@@ -301,8 +301,9 @@ impl Block {
             return (0..codec.parts() as u8).map(of_level).collect();
         };
         let passes = codec.passes(pyramid, self.of);
-        // Encoders before left out each k whose nodes are all zero, as a ghost and finer codes can cancel each other.
-        let changes = field.changes(&passes, self.step, self.codes.sparse(), self.above.as_ref(), &field.nonzero());
+        // Earlier encoders counted no change of a k whose nodes are all zero, although a ghost and finer codes can cancel each other.
+        let nonzero = field.nonzero(&passes);
+        let changes = field.changes(&passes, self.step, self.codes.sparse(), self.above.as_ref(), &nonzero);
         changes.iter().map(Change::largest).collect()
     }
 

@@ -213,7 +213,7 @@ impl Encoder {
     ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::new();
         sample::for_each_run(codec.sample, samples, |first, values| {
-            let present = (first..).zip(values).filter(|(sample, _)| !missing.is(*sample));
+            let present = (first..).zip(values).filter(|(sample, _)| !missing.has(*sample));
             present.for_each(|(_, value)| tally.add(*value, 0.0));
         });
         let size = codec.sample.size();

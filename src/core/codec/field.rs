@@ -14,7 +14,7 @@ use wavesplat_format::{EncodedBlock, Pyramid, SparseCodes};
 #[derive(Debug)]
 pub struct Field<'a> {
     values: Values<'a>,
-    /// Whether each k may have coefficients that are not zero. The values of others are arbitrary: zeros would take fresh memory.
+    /// Whether each k may have coefficients that are not zero. The values of others are arbitrary: writing zeros would touch fresh memory.
     marked: Vec<bool>,
 }
 
@@ -249,16 +249,13 @@ impl<'a> Field<'a> {
         above: Option<&Above>,
         marked: &[bool],
     ) -> Vec<Change> {
-        let (parts, [x, y, z, _]) = (passes.coded(codes), passes.nodes());
-        let (size, marked) = ([x, y, z], Some(marked));
+        let parts = passes.coded(codes);
         match &self.values {
             Values::Single(values) => {
-                let field = Nodes { values, size, marked };
-                passes.changes(&parts, step, codes, above.map(Above::singles), field)
+                passes.changes(&parts, step, codes, above.map(Above::singles), passes.field(values, marked))
             }
             Values::Double(values) => {
-                let field = Nodes { values, size, marked };
-                passes.changes(&parts, step, codes, above.map(Above::doubles), field)
+                passes.changes(&parts, step, codes, above.map(Above::doubles), passes.field(values, marked))
             }
             Values::Zero | Values::Codes { .. } => vec![Change::default(); PARTS],
         }
@@ -270,15 +267,15 @@ impl<'a> Field<'a> {
     }
 
     /// Whether each k has coefficients that are not zero.
-    pub(super) fn nonzero(&self) -> Vec<bool> {
-        let each = |all: usize| all / self.marked.len().max(1);
-        let of_k = |k: usize| match &self.values {
-            Values::Single(values) => !rows::is_zero(&values[k * each(values.len())..][..each(values.len())]),
-            Values::Double(values) => !rows::is_zero(&values[k * each(values.len())..][..each(values.len())]),
-            Values::Zero => false,
-            Values::Codes { .. } => true,
-        };
-        self.marked.iter().enumerate().map(|(k, marked)| *marked && of_k(k)).collect()
+    pub(super) fn nonzero(&self, passes: &PredictionPasses<'_>) -> Vec<bool> {
+        fn of<R: Real>(nodes: Nodes<'_, R>, ks: usize) -> Vec<bool> {
+            (0..ks).map(|k| !nodes.is_zero(k..k + 1)).collect()
+        }
+        match &self.values {
+            Values::Single(values) => of(passes.field(values, &self.marked), self.marked.len()),
+            Values::Double(values) => of(passes.field(values, &self.marked), self.marked.len()),
+            Values::Zero | Values::Codes { .. } => self.marked.clone(),
+        }
     }
 
     /// Copies coefficients of one k from voxel `voxel` on.

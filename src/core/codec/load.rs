@@ -32,7 +32,7 @@ impl Missing {
     }
 
     /// Whether a sample is missing.
-    pub(super) fn is(&self, sample: usize) -> bool {
+    pub(super) fn has(&self, sample: usize) -> bool {
         self.count > 0 && self.mask[sample]
     }
 
@@ -66,7 +66,7 @@ pub(super) fn load_group(
     }
     for (frame, (source, weight)) in group.source.iter().zip(&mut group.weight).enumerate() {
         let (at, weights) = (frame * voxels + first, weighing.weights(source));
-        *weight = std::array::from_fn(|l| if l < count && !missing.is(at + l) { weights[l] } else { 0.0 });
+        *weight = std::array::from_fn(|l| if l < count && !missing.has(at + l) { weights[l] } else { 0.0 });
     }
     if missing.count > 0 {
         (0..count).for_each(|lane| fill(&mut group.source, &group.weight, lane));

@@ -73,8 +73,8 @@ impl Source<'_> {
     }
 
     /// Encodes the block, which covers `size` voxels, by a pyramid, from the samples of `outer`, which also has nodes that only
-    /// predict, and the known nodes. The decoded nodes are left in `field`, and their codes in `codes`. None if the block must be stored exactly, or,
-    /// above tier 0, without codes.
+    /// predict, and the known nodes. Leaves the decoded nodes in `field`, and their codes in `codes`. None if the block must be stored
+    /// exactly, or, above tier 0, without codes.
     ///
     /// The scheme's step suits most blocks. Where so many samples miss the bound that storing them exactly takes a large
     /// share of the bytes, finer steps are tried. Samples of blocks above tier 0 are stored with the blocks below.
@@ -118,9 +118,8 @@ impl Source<'_> {
         let Checked { listed, marked, tally } = checked;
         let mut tally = tally?;
         let outliers = tally.take_outliers(self.codec, self.samples);
-        let field = Nodes { values: field, size, marked: Some(&marked) };
         // The directory lists no other parts.
-        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, field);
+        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, passes.field(field, &marked));
         let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
         let parts = Some((0..).zip(&changes).map(of_part).collect());
         Some(Coded { step, marked, parts, dropped: tally.squared_error, outliers, tally })
@@ -306,7 +305,7 @@ impl Source<'_> {
 
     /// The index of a sample; none if it is missing.
     fn sample_index(&self, index: usize) -> Option<usize> {
-        (!self.missing.is(index)).then_some(index)
+        (!self.missing.has(index)).then_some(index)
     }
 
     /// Whether storing the samples that miss the bound is cheaper than storing all samples exactly.

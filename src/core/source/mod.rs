@@ -251,7 +251,7 @@ pub fn read_frames(
     Ok(samples)
 }
 
-/// As [`read_frames`], into all of `samples`, which are as long.
+/// As [`read_frames`], into `samples`, which must have the length of its result.
 pub fn read_frames_into(
     window: &dyn FrameWindow,
     frames: impl ExactSizeIterator<Item = usize>,

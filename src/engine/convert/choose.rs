@@ -95,7 +95,7 @@ impl SchemeSelector<'_> {
             return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
         let smallest = if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() };
-        codec::release_spare(); // those of trials are too small for blocks
+        codec::release_spare(); // buffers of trials are too small for blocks
         smallest
     }
 

@@ -18,7 +18,7 @@ pub(crate) struct Nodes<'a, R> {
 
 impl<R: Real> Nodes<'_, R> {
     /// Whether all nodes of all these k are zero.
-    pub(super) fn is_zero(&self, mut ks: Range<usize>) -> bool {
+    pub(crate) fn is_zero(&self, mut ks: Range<usize>) -> bool {
         let each: usize = self.size.iter().product();
         let nodes = |k: usize| self.values.get(k * each..(k + 1) * each).unwrap_or_default();
         ks.all(|k| !self.has(k) || rows::is_zero(nodes(k)))

@@ -256,12 +256,12 @@ impl<'a> PredictionPasses<'a> {
         runs: &[Range<usize>],
         known: Option<Nodes<'_, R>>,
     ) -> bool {
-        let has_codes = |(_, runs): (_, &Range<usize>)| {
+        let has_codes = |runs: &Range<usize>| {
             let each = runs.len() / self.pyramids;
             (0..each).any(|n| !codes.run(runs.start + number * each + n).1.is_empty())
         };
-        self.boxes.iter().zip(runs).filter(|(of, _)| of.of.is_some()).any(has_codes)
-            || known.is_some_and(|known| !known.is_zero(self.ks(number)))
+        let mut runs_of_passes = self.boxes.iter().zip(runs).filter(|(of, _)| of.of.is_some()).map(|(_, runs)| runs);
+        runs_of_passes.any(has_codes) || known.is_some_and(|known| !known.is_zero(self.ks(number)))
     }
 
     /// As [`Self::marked`], from all codes, pass after pass.
@@ -286,6 +286,12 @@ impl<'a> PredictionPasses<'a> {
             self.stages.refine(&[true], nodes, &mut self.sparse(k, step, codes, known, PARTS));
         }
         some
+    }
+
+    /// The nodes of a field: `marked` are the k that may have some that are not zero.
+    pub(crate) fn field<'n, R: Real>(&self, values: &'n [R], marked: &'n [bool]) -> Nodes<'n, R> {
+        let [x, y, z, _] = self.nodes();
+        Nodes { values, size: [x, y, z], marked: Some(marked) }
     }
 
     /// The number of codes of a block.

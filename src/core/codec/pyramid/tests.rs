@@ -139,8 +139,7 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
 /// Puts zeros for every k that is not marked. Decoding must have left its nodes as they were.
 pub(super) fn put_zeros(marked: &[bool], field: &mut [f64]) {
     let each = field.len() / marked.len().max(1);
-    for nodes in field.chunks_exact_mut(each.max(1)).zip(marked).filter(|(_, marked)| !**marked).map(|(nodes, _)| nodes)
-    {
+    for (nodes, _) in field.chunks_exact_mut(each.max(1)).zip(marked).filter(|(_, marked)| !**marked) {
         assert!(nodes.iter().all(|node| node.is_nan()));
         nodes.fill(0.0);
     }

@@ -57,7 +57,7 @@ impl Renderer for Projection {
         let report = |(view, setup): (&View, &ViewSetup)| ViewReport {
             method: setup.method.name,
             stated_splat_error: setup.stated_error,
-            splat_error_is_estimate: config.fast && setup.backend.is_lattice(),
+            splat_error_is_estimate: setup.is_quick_look(config),
             ..ViewReport::new(view, &setup.camera)
         };
         config.views.iter().zip(&self.setups).map(report).collect()

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Both sums of eq 12 are splatted in the same way, so g is a mean even if splatting leaves out weights. Eq 16 uses
-//! uncut weights, so that the background does not depend on the splat method. Missing samples have no weight: their
+//! uncut weights, except for a quick look, so that the background does not depend on the splat method. Missing samples have no weight: their
 //! weights are subtracted.
 
 use crate::render::batches::ViewWeights;
@@ -77,8 +77,8 @@ impl<'a> WeightSums<'a> {
             let boxes = boxes.iter().map(reference).collect::<Result<Vec<_>>>()?;
             let uncut = |pixel: [usize; 2]| boxes.iter().map(|voxels| voxels.at(pixel)).sum();
             // The error of a quick look is an estimate for samples of any kind; weights vary less.
-            let is_estimate = config.fast && setup.backend.is_lattice();
-            let near = if is_estimate { 0.0 } else { setup.stated_error * reference(&setup.clip)?.most() };
+            let near =
+                if setup.is_quick_look(config) { 0.0 } else { setup.stated_error * reference(&setup.clip)?.most() };
             self.judge_background(&uncut, near);
         }
         Ok(self)

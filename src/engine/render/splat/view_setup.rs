@@ -34,6 +34,11 @@ pub(in crate::render) struct ViewSetup {
 }
 
 impl ViewSetup {
+    /// Whether the stated error is an estimate, as pictures are drawn for a quick look.
+    pub(in crate::render) fn is_quick_look(&self, config: &RenderConfig) -> bool {
+        config.fast && self.backend.is_lattice()
+    }
+
     /// The setup of a view of `grid`, which is cut into `blocks`.
     ///
     /// # Errors
