@@ -57,7 +57,7 @@ impl<'a> BandAccumulator<'a> {
     fn filter(&mut self) {
         let sums = std::mem::replace(&mut self.sums, BandSums::Tiles(Vec::new()));
         self.sums = match sums {
-            BandSums::Cells(lattice, cells) => BandSums::Filtered(lattice, lattice.filter(cells)),
+            BandSums::Cells(lattice, cells) => BandSums::Filtered(lattice, lattice.filter(cells, &self.band.rect)),
             sums => sums,
         };
     }

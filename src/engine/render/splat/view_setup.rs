@@ -51,11 +51,12 @@ impl ViewSetup {
         let reference = ReferenceWeights::new(&camera, grid, clip, kernel)?;
         let splatted = SplattedView { kernel, grid, clip: &clip, blocks, camera: &camera, footprint: &footprint };
         let (backend, method) = SplatBackend::choose(config, &splatted, reference.slices());
-        let share = most_splat_error(config.quantity, config.splat_error) - method.stated_error;
+        let most = most_splat_error(config.quantity, config.splat_error);
+        let share = most - method.stated_error;
         let leaves_out = !config.certify && kernel.tau != 0.0 && share > 0.0;
         let deepest = if leaves_out { reference.deepest(share) } else { f64::INFINITY };
         let (deepest, stated_error) = match deepest < camera.depth(grid) {
-            true => (deepest, method.stated_error + share),
+            true => (deepest, most),
             false => (f64::INFINITY, method.stated_error),
         };
         Ok(Self { camera, footprint, grid: *grid, blocks, clip, backend, method, stated_error, deepest })

@@ -15,20 +15,22 @@
 //! summed with the kernel, and A_v the same along v. Then w~ = A_u A_v w, and
 //!
 //! ```text
-//! w~ - w = (A_u - 1) w + A_u (A_v - 1) w                                                                  (eq 39)
+//! w~ - w = (A_v - 1) w + A_v (A_u - 1) w                                                                  (eq 39)
 //! ```
 //!
-//! At a fixed v, w is a Gaussian along u with the conditional deviation. So [`Axis::new`] sums the first part along one
-//! axis, for all positions of pixel and slice between cells. The second part is the error along v, a Gaussian's shape
-//! along u, times at most the blur of A_u. On a principal axis w is a product, and A_u changes nothing but an error of
-//! second order.
+//! At a fixed u, w is a Gaussian along v with the conditional deviation. So [`Axis::new`] sums the first part along one
+//! axis, for all positions of pixel and slice between cells. The second part is the error along u, a Gaussian's shape
+//! along v, times at most the blur of A_v. If rows move, A_u differs from row to row: its error is the largest for any
+//! move. If not, u and v may change places; and on a principal axis w is a product, and A_v changes nothing but an error
+//! of second order.
 //!
 //! A ray meets at most K slices, so P <= K times the P of a slice. It is stated as a share of the largest sum of weights
 //! in the picture ([`super::picture`]). To this come the kernel's cut and the rounding to f32.
 
+use super::Spreading;
 use super::fit::{AxisFit, Spread};
 use super::kernel::Kernel;
-use super::prefilter::HALF;
+use super::prefilter::MovingPrefilter;
 
 /// Upper bounds for an infinite slice of voxels, as shares of its largest sum of weights.
 #[derive(Debug, Clone, Copy)]
@@ -42,23 +44,28 @@ pub(in crate::render) struct SliceError {
 }
 
 impl SliceError {
-    /// The error with `fineness` cells per voxel, spread along u and v.
-    pub(super) fn new(weighting: &Weighting<'_>, fineness: usize, fits: &[AxisFit; 2]) -> Self {
-        Self::at_positions(weighting, fineness, fits, 1)
+    /// The error of spreading voxels and gathering them with a kernel.
+    pub(super) fn new(weighting: &Weighting<'_>, spreading: &Spreading) -> Self {
+        Self::at_positions(weighting, spreading, 1)
     }
 
     /// A lower bound of these bounds, from few positions.
-    pub(super) fn at_least(weighting: &Weighting<'_>, fineness: usize, fits: &[AxisFit; 2]) -> Self {
-        Self::at_positions(weighting, fineness, fits, FEW)
+    pub(super) fn at_least(weighting: &Weighting<'_>, spreading: &Spreading) -> Self {
+        Self::at_positions(weighting, spreading, FEW)
     }
 
-    fn at_positions(weighting: &Weighting<'_>, fineness: usize, fits: &[AxisFit; 2], step: usize) -> Self {
+    fn at_positions(weighting: &Weighting<'_>, spreading: &Spreading, step: usize) -> Self {
         let Weighting { kernel, cut, roundings } = *weighting;
+        let Spreading { shear, fits: [along, across], moving, .. } = spreading;
         let (marginal, conditional) = (kernel.sigmas(), kernel.conditional_sigmas());
-        let axis = |i: usize| Axis::new(fineness, &fits[i], [conditional[i], marginal[i]], step);
-        let [u, v] = [axis(0), axis(1)];
-        // Either axis may be replaced first.
-        let both = |[eu, ev]: [f64; 2]| (eu + ev * u.blur).min(ev + eu * v.blur).min(product(kernel, [eu, ev]));
+        let row = |fit, moving| Row { fineness: shear.fineness, fit, moving, step };
+        let u = Axis::new(&row(along, moving.as_ref()), [conditional[0], marginal[0]]);
+        let v = Axis::new(&row(across, None), [conditional[1], marginal[1]]);
+        let across_first = |[eu, ev]: [f64; 2]| ev + eu * v.blur;
+        // Rows that do not move are filtered in either order.
+        let either = |[eu, ev]: [f64; 2]| (eu + ev * u.blur).min(product(kernel, [eu, ev]));
+        let both =
+            |errors| if moving.is_some() { across_first(errors) } else { across_first(errors).min(either(errors)) };
         let cut = cut * u.amplified * v.amplified;
         let rounding = ROUNDING * roundings as f64 * u.blur * v.blur;
         let bound = |errors| both(errors) + cut + rounding;
@@ -126,36 +133,58 @@ const WAVE: isize = 8;
 /// Voxels farther than this many deviations and cells have no weight.
 const FAR: f64 = 8.0;
 
+/// A row of voxels, their cells, and the positions that are tried.
+struct Row<'a> {
+    fineness: usize,
+    fit: &'a AxisFit,
+    /// The filter that moves the row of cells, by any share of a cell.
+    moving: Option<&'a MovingPrefilter>,
+    /// Every so many positions are tried.
+    step: usize,
+}
+
 impl Axis {
     /// The bounds for a Gaussian with a `conditional` and a `marginal` deviation in cells (eq 39).
-    fn new(fineness: usize, fit: &AxisFit, [conditional, marginal]: [f64; 2], step: usize) -> Self {
-        let mut most = Self::default();
-        let mut largest = [0.0_f64; 2];
+    fn new(row: &Row<'_>, [conditional, marginal]: [f64; 2]) -> Self {
+        let (mut most, mut largest) = (Self::default(), [0.0_f64; 2]);
         let tables = [conditional, marginal].map(Table::new);
-        // Mirrored positions have the same sums.
-        for voxel in (0..=PHASES / 2).step_by(step) {
-            // Voxels lie at this position and every `fineness` cells from it.
-            let (first, cells) = filtered(fit, voxel as f64 / PHASES as f64);
-            let by_phase = |n: usize| cells.iter().skip(n).step_by(fineness).map(|w| w.abs()).sum::<f64>();
-            most.amplified = (0..fineness).map(by_phase).fold(most.amplified, f64::max);
-            for pixel in (0..PHASES * fineness).step_by(step) {
-                let row = Row { voxel, pixel, fineness, first, cells: &cells };
-                let RowSums { sum, of_ones, of_wave, exact: weights, .. } = row.sums(&tables[0]);
-                let RowSums { blurred, exact: marginal_weights, .. } = row.sums(&tables[1]);
-                largest = [largest[0].max(weights), largest[1].max(marginal_weights)];
-                most.sum = most.sum.max(sum);
-                most.of_ones = most.of_ones.max(of_ones.abs());
-                most.of_waves = most.of_waves.max(of_wave[0].hypot(of_wave[1]));
-                most.blur = most.blur.max(blurred);
+        let half = if row.moving.is_some() { PHASES as isize / 2 } else { 0 };
+        for by in (-half..=half).step_by(row.step) {
+            let moved = row.moving.map(|moving| moving.taps(by as f64 / PHASES as f64));
+            let taps = moved.as_ref().map_or(&row.fit.taps[..], |taps| taps);
+            // Mirrored positions have the same sums.
+            for voxel in (0..=PHASES / 2).step_by(row.step) {
+                let (first, cells) = filtered(&row.fit.at(voxel as f64 / PHASES as f64), row.fit.width, taps);
+                most.add(
+                    &VoxelRow { voxel, by, fineness: row.fineness, first, cells: &cells },
+                    row.step,
+                    &tables,
+                    &mut largest,
+                );
             }
         }
-        let margin = if step == 1 { MARGIN } else { 1.0 };
+        let margin = if row.step == 1 { MARGIN } else { 1.0 };
         most.sum *= margin / largest[0];
         most.of_ones *= margin / largest[0];
         most.of_waves *= margin / largest[0];
         most.blur *= margin / largest[1];
-        most.amplified *= fineness as f64;
+        most.amplified *= row.fineness as f64;
         most
+    }
+
+    /// Takes in the sums of a row of voxels at every `step`-th position of a pixel, and the `largest` sums of both Gaussians.
+    fn add(&mut self, row: &VoxelRow<'_>, step: usize, tables: &[Table; 2], largest: &mut [f64; 2]) {
+        let by_phase = |n: usize| row.cells.iter().skip(n).step_by(row.fineness).map(|w| w.abs()).sum::<f64>();
+        self.amplified = (0..row.fineness).map(by_phase).fold(self.amplified, f64::max);
+        for pixel in (0..PHASES * row.fineness).step_by(step) {
+            let RowSums { sum, of_ones, of_wave, exact, .. } = row.sums(pixel, &tables[0]);
+            let RowSums { blurred, exact: of_marginal, .. } = row.sums(pixel, &tables[1]);
+            *largest = [largest[0].max(exact), largest[1].max(of_marginal)];
+            self.sum = self.sum.max(sum);
+            self.of_ones = self.of_ones.max(of_ones.abs());
+            self.of_waves = self.of_waves.max(of_wave[0].hypot(of_wave[1]));
+            self.blur = self.blur.max(blurred);
+        }
     }
 }
 
@@ -194,26 +223,28 @@ struct RowSums {
     exact: f64,
 }
 
-/// A row of voxels and a pixel, whose positions are multiples of 1 / [`PHASES`] cells.
-struct Row<'a> {
+/// A row of voxels, at positions that are multiples of 1 / [`PHASES`] cells.
+struct VoxelRow<'a> {
+    /// A voxel lies here, and others every `fineness` cells from it.
     voxel: usize,
-    pixel: usize,
     fineness: usize,
+    /// Cells have moved by this.
+    by: isize,
     /// The first cell that the voxel reaches, and the weights of the cells from there on.
     first: isize,
     cells: &'a [f64],
 }
 
-impl Row<'_> {
-    fn sums(&self, gaussian: &Table) -> RowSums {
+impl VoxelRow<'_> {
+    fn sums(&self, pixel: usize, gaussian: &Table) -> RowSums {
         let reach = ((gaussian.far + self.cells.len() as f64) / self.fineness as f64).ceil() as isize;
         let mut sums = RowSums::default();
         for n in -reach..=reach {
-            let at = self.pixel as isize - n * (self.fineness * PHASES) as isize;
+            let at = pixel as isize - n * (self.fineness * PHASES) as isize;
             let exact = gaussian.at(at - self.voxel as isize);
             let (mut sum, mut blurred) = (0.0, 0.0);
             for (cell, weight) in (self.first..).zip(self.cells) {
-                let here = gaussian.at(at - cell * PHASES as isize);
+                let here = gaussian.at(at - self.by - cell * PHASES as isize);
                 sum += weight * here;
                 blurred += weight.abs() * here;
             }
@@ -229,99 +260,149 @@ impl Row<'_> {
     }
 }
 
-/// The filtered cells of a voxel: the first one that it reaches, and its weights.
-pub(super) fn filtered(fit: &AxisFit, voxel: f64) -> (isize, Vec<f64>) {
-    let Spread { first, weights } = fit.at(voxel);
-    let mut out = vec![0.0; fit.width + 2 * HALF];
-    for (n, weight) in weights[..fit.width].iter().enumerate() {
-        for j in 0..=2 * HALF {
-            out[n + j] += weight * fit.taps[j.abs_diff(HALF)];
-        }
+/// The filtered cells of a voxel that is spread to `width` cells: the first one that it reaches, and its weights.
+fn filtered(spread: &Spread, width: usize, taps: &[f64]) -> (isize, Vec<f64>) {
+    let mut out = vec![0.0; width + taps.len() - 1];
+    for (n, weight) in spread.weights[..width].iter().enumerate() {
+        taps.iter().rev().enumerate().for_each(|(j, tap)| out[n + j] += weight * tap);
     }
-    (first - HALF as isize, out)
+    (spread.first - (taps.len() / 2) as isize, out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::axis::Cut;
-    use super::super::kernel::Weights;
+    use super::super::prefilter::MovingTaps;
     use super::super::shear::Shear;
+    use super::super::upright::{Move, Upright};
+    use super::super::{Choice, Sums};
     use super::*;
     use wavesplat_core::base::grid::Grid;
     use wavesplat_core::view::camera::{Camera, View};
 
     /// A view of four pixels a voxel.
-    #[derive(Clone, Copy)]
+    #[derive(Debug, Clone, Copy)]
     struct Seen {
         azimuth: f64,
         elevation: f64,
+        roll: f64,
         /// Standard deviation in pixels.
         sigma: f64,
         /// The cut in standard deviations.
         radius: f64,
     }
 
-    fn kernel(Seen { azimuth, elevation, sigma, radius }: Seen, fineness: usize) -> (Shear, Kernel) {
-        let grid = Grid::unit([20, 20, 20]);
-        let view = View { azimuth, elevation, roll: 20.0, size: [100, 100], scale: Some(4.0), center: None };
-        let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, fineness);
-        let kernel = Kernel::new(&shear, sigma, Cut { radius, phases: 1024 }).expect("a kernel");
-        (shear, kernel)
+    /// The lattice of a view.
+    struct Splatted {
+        kernel: Kernel,
+        upright: Upright,
+        spreading: Spreading,
+        /// For each row of cells from -[`ROWS`] on, how far it moves, and its filter.
+        rows: Vec<(isize, Vec<f64>)>,
     }
 
-    fn fits(kernel: &Kernel, width: usize) -> [AxisFit; 2] {
-        kernel.conditional_sigmas().map(|sigma| AxisFit::new(width, sigma))
-    }
+    const ROWS: isize = 80;
 
-    fn weighting(kernel: &Kernel) -> Weighting<'_> {
-        Weighting { kernel, cut: kernel.cut(), roundings: 8 }
+    impl Splatted {
+        fn new(seen: Seen, fineness: usize, width: usize) -> Self {
+            let Seen { azimuth, elevation, roll, sigma, radius } = seen;
+            let grid = Grid::unit([20, 20, 20]);
+            let view = View { azimuth, elevation, roll, size: [100, 100], scale: Some(4.0), center: None };
+            let camera = Camera::new(&view, &grid).expect("a valid view");
+            let shear = Shear::new(&camera, &grid, fineness).widened();
+            let kernel = Kernel::new(&shear, sigma);
+            let upright = Upright::new(&shear, sigma, Cut { radius, phases: 1024 }).expect("a kernel");
+            let choice = Choice::new(fineness, width, Sums::Double);
+            let spreading = Spreading::new(shear, choice, kernel.conditional_sigmas(), 0.0, 20);
+            let of_row = |v: isize| {
+                let Move { cells, rest } = upright.moved(v);
+                let moved: Option<MovingTaps> = spreading.moving.as_ref().map(|moving| moving.taps(rest));
+                (cells, moved.map_or(spreading.fits[0].taps.to_vec(), |taps| taps.to_vec()))
+            };
+            let rows = (-ROWS..=ROWS).map(of_row).collect();
+            Self { kernel, upright, spreading, rows }
+        }
+
+        fn stated(&self) -> SliceError {
+            let weighting = Weighting { kernel: &self.kernel, cut: self.upright.cut(), roundings: 8 };
+            SliceError::new(&weighting, &self.spreading)
+        }
     }
 
     #[test]
     fn finer_and_more_cells_are_nearer() {
-        for (azimuth, elevation, most) in [(0.0, 0.0, 1.0), (30.0, 30.0, 1.0), (45.0, 35.26, 0.9)] {
-            for (fineness, width, error) in [(2, 4, 6e-4), (2, 5, 3e-4), (3, 5, 2e-5), (3, 6, 2e-5), (4, 6, 1e-5)] {
-                let (_, kernel) = kernel(Seen { azimuth, elevation, sigma: 3.0, radius: 6.0 }, fineness);
-                let stated = SliceError::new(&weighting(&kernel), fineness, &fits(&kernel, width)).of_a_mean();
-                assert!(stated < most * error, "{fineness} {width} at {azimuth}: {stated:e}");
+        let upright = [6e-4, 3e-4, 2e-5, 2e-5, 1e-5];
+        let leaning = [8e-4, 8e-4, 3e-5, 3e-5, 1.5e-5];
+        let seen = |azimuth, elevation, roll| Seen { azimuth, elevation, roll, sigma: 3.0, radius: 6.0 };
+        for (seen, errors) in [
+            (seen(0.0, 0.0, 0.0), upright),
+            (seen(30.0, 30.0, 0.0), upright),
+            (seen(45.0, 35.26, 20.0), upright.map(|error| 0.9 * error)),
+            (seen(0.0, 0.0, 20.0), leaning),
+            (seen(30.0, 70.0, 0.0), leaning),
+        ] {
+            for ((fineness, width), error) in [(2, 4), (2, 5), (3, 5), (3, 6), (4, 6)].into_iter().zip(errors) {
+                let stated = Splatted::new(seen, fineness, width).stated().of_a_mean();
+                assert!(stated < error, "{fineness} {width} {seen:?}: {stated:e}");
             }
         }
+    }
+
+    /// The weights of the cells around a pixel, from the first column and row on.
+    fn weights(upright: &Upright, [x, y]: [f64; 2]) -> (isize, Vec<(isize, Vec<f32>)>) {
+        let mut along = vec![0.0; upright.along.padded()];
+        let first = upright.along.weights(upright.u[0] + x * upright.u[1], &mut along);
+        let column = |(u, weight): (isize, &f32)| {
+            let mut across = vec![0.0; upright.across.padded()];
+            let [origin, per_row, per_column] = upright.v;
+            let top = upright.across.weights(origin + y * per_row + u as f64 * per_column, &mut across);
+            (top, across.iter().map(|of_row| of_row * weight).collect())
+        };
+        (first, (first..).zip(&along).map(column).collect())
     }
 
     /// The sums of |E_i|, of E_i and of weights of an infinite slice, straight from the definition.
-    fn sums(shear: &Shear, kernel: &Kernel, fits: &[AxisFit; 2], [slice, pixel]: [[f64; 2]; 2]) -> [f64; 3] {
-        let q = shear.fineness as f64;
-        let cells = [0, 1].map(|i| filtered(&fits[i], slice[i]));
-        let mut weights = Weights::new(kernel);
-        let (mut off, mut signed, mut all) = (0.0, 0.0, 0.0);
-        for (n, m) in (-12..=12).flat_map(|n| (-12..=12).map(move |m| (f64::from(n), f64::from(m)))) {
-            let at = [pixel[0] - n * q, pixel[1] - m * q];
-            kernel.weights(at, &mut weights);
-            let mut sum = 0.0;
-            for (v, u, weights) in weights.rows() {
-                for (u, of_pixel) in (u..).zip(weights) {
-                    let cell = [u, v];
-                    let weight = |a: usize| usize::try_from(cell[a] - cells[a].0).ok().and_then(|c| cells[a].1.get(c));
-                    if let (Some(along), Some(across)) = (weight(0), weight(1)) {
-                        sum += f64::from(*of_pixel) * along * across;
+    fn sums(splatted: &Splatted, [slice, pixel]: [[f64; 2]; 2]) -> [f64; 3] {
+        let Splatted { kernel, upright, spreading: Spreading { shear, fits: [along, across], .. }, rows: moves } =
+            splatted;
+        let q = shear.fineness as isize;
+        let (first, columns) = weights(upright, shear.pixel(pixel));
+        let (low, of_rows) = filtered(&across.at(slice[1]), across.width, &across.taps);
+        let (spread, mut sums) = (along.at(slice[0]), [0.0; 3]);
+        let most = 12.max(24 / q); // voxels to each side that the filters reach
+        for m in -most..=most {
+            let of_row = |(v, weight): (isize, &f64)| {
+                let (cells, taps) = &moves[(v + ROWS) as usize];
+                let (u, filtered) = filtered(&spread, along.width, taps);
+                (v, *weight, u - cells, filtered)
+            };
+            let rows: Vec<_> = (low + m * q..).zip(&of_rows).map(of_row).collect();
+            for n in -most..=most {
+                let mut sum = 0.0;
+                for (v, across, u, cells) in &rows {
+                    for (u, along) in (u + n * q..).zip(cells) {
+                        let column = usize::try_from(u - first).ok().and_then(|u| columns.get(u));
+                        let of_pixel = column.and_then(|(top, of_rows)| of_rows.get(usize::try_from(v - top).ok()?));
+                        sum += across * along * of_pixel.map_or(0.0, |weight| f64::from(*weight));
                     }
                 }
+                let voxel = [slice[0] + (n * q) as f64, slice[1] + (m * q) as f64];
+                let exact = kernel.gaussian([pixel[0] - voxel[0], pixel[1] - voxel[1]]);
+                sums = [sums[0] + (sum - exact).abs(), sums[1] + sum - exact, sums[2] + exact];
             }
-            let exact = kernel.gaussian([at[0] - slice[0], at[1] - slice[1]]);
-            (off, signed, all) = (off + (sum - exact).abs(), signed + sum - exact, all + exact);
         }
-        [off, signed.abs(), all]
+        [sums[0], sums[1].abs(), sums[2]]
     }
 
     /// The largest sums of |E_i| and of E_i of any slice and pixel, as shares of the largest sum of weights.
-    fn largest(shear: &Shear, kernel: &Kernel, fits: &[AxisFit; 2]) -> [f64; 2] {
+    fn largest(splatted: &Splatted) -> [f64; 2] {
         let mut most = [0.0_f64; 3];
         for n in 0..144_usize {
             // Voxels repeat after `fineness` cells.
             let third = |n: usize| (n % 3) as f64 / 3.0;
-            let quarter = |n: usize| (n % 4 * shear.fineness) as f64 / 4.0;
+            let quarter = |n: usize| (n % 4 * splatted.spreading.shear.fineness) as f64 / 4.0;
             let places = [[third(n), third(n / 3)], [quarter(n / 9), quarter(n / 36)]];
-            let found = sums(shear, kernel, fits, places);
+            let found = sums(splatted, places);
             (0..3).for_each(|i| most[i] = most[i].max(found[i]));
         }
         [most[0] / most[2], most[1] / most[2]]
@@ -332,14 +413,19 @@ mod tests {
         let views = [(0.0, 0.0), (3.0, 2.0), (17.0, 9.0), (30.0, 30.0), (45.0, 35.26), (100.0, -70.0)];
         for (n, (azimuth, elevation)) in views.into_iter().enumerate() {
             for sigma in if n < 2 { &[1.2, 2.4, 3.0, 4.0][..] } else { &[3.0] } {
-                for (fineness, width) in [(1, 4), (1, 5), (2, 4), (2, 5), (3, 5), (3, 6), (4, 6)] {
-                    let (shear, kernel) = kernel(Seen { azimuth, elevation, sigma: *sigma, radius: 4.8 }, fineness);
-                    let fits = fits(&kernel, width);
-                    let stated = SliceError::new(&weighting(&kernel), fineness, &fits);
-                    let [off, signed] = largest(&shear, &kernel, &fits);
-                    let what = format!("{fineness} {width} at {azimuth}, {sigma}: {off:e} {signed:e}, {stated:?}");
+                for (m, (fineness, width)) in
+                    [(1, 4), (1, 5), (2, 4), (2, 5), (3, 5), (3, 6), (4, 6)].into_iter().enumerate()
+                {
+                    let roll = [20.0, 0.0, 77.0, 45.0][(n + m) % 4];
+                    let seen = Seen { azimuth, elevation, roll, sigma: *sigma, radius: 4.8 };
+                    let splatted = Splatted::new(seen, fineness, width);
+                    let stated = splatted.stated();
+                    let [off, signed] = largest(&splatted);
+                    let what =
+                        format!("{fineness} {width} at {azimuth}, {roll}, {sigma}: {off:e} {signed:e}, {stated:?}");
                     assert!(off <= stated.sum && signed <= stated.of_ones, "{what}");
-                    assert!(off > 0.25 * stated.sum || stated.sum < 1e-3, "{what}");
+                    let tight = if splatted.spreading.moving.is_some() { 0.2 } else { 0.25 };
+                    assert!(off > tight * stated.sum || stated.sum < 1e-3, "{what}");
                 }
             }
         }

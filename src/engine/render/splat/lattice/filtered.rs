@@ -1,8 +1,8 @@
-//! The cells of a band after the prefilter (eq 36), with planes side by side.
+//! The cells of a band after the prefilter (eq 36), with upright columns (eq 46), and planes side by side.
 
 use super::Sums;
 use super::cells::{Aligned, Cells, LINE, PlaneSums, Rectangle, TOGETHER};
-use super::prefilter::{HALF, Taps};
+use super::prefilter::{HALF, MOVING_HALF, MovingTaps, Taps};
 use rayon::prelude::*;
 use std::ops::Range;
 use wavesplat_core::base::vectors::dispatch;
@@ -28,6 +28,42 @@ pub(super) struct Window {
     pub(super) first: [isize; 2],
     /// Cells along u and v.
     pub(super) size: [usize; 2],
+}
+
+/// The filters of a band.
+#[derive(Debug)]
+pub(super) struct Filters {
+    /// The filter along v.
+    pub(super) across: Taps,
+    /// The filter along u of each row of cells.
+    pub(super) along: Vec<Along>,
+    /// The cells after the filters; the same rows as before.
+    pub(super) window: Window,
+}
+
+/// The filter along u of a row of cells.
+#[derive(Debug)]
+pub(super) struct Along {
+    /// The column before the filter that becomes the first one after it.
+    pub(super) start: isize,
+    pub(super) taps: AlongTaps,
+}
+
+/// The taps of a row that does not move, or of one that does.
+#[derive(Debug)]
+pub(super) enum AlongTaps {
+    Still(Taps),
+    Moving(MovingTaps),
+}
+
+impl AlongTaps {
+    /// Cells to each side of a filtered cell.
+    fn half(&self) -> usize {
+        match self {
+            Self::Still(_) => HALF,
+            Self::Moving(_) => MOVING_HALF,
+        }
+    }
 }
 
 /// Planes side by side, cell by cell.
@@ -58,33 +94,44 @@ pub(super) fn side_by_side(planes: usize) -> usize {
 }
 
 impl FilteredCells {
-    /// Filters all planes along u and v. The sums of a group are freed before the next group is filtered.
-    pub(super) fn new(cells: Cells, taps: &[Taps; 2]) -> Self {
+    /// Filters all planes along v and u. The sums of a group are freed before the next group is filtered.
+    pub(super) fn new(cells: Cells, filters: &Filters) -> Self {
         let Cells { rectangle, single, planes, sums } = cells;
-        let [along, across] = taps;
-        let window = Window { first: rectangle.first, size: rectangle.size };
+        let window = filters.window;
         if sums == Sums::Double {
-            let double_groups = double_groups(&rectangle, planes, taps);
-            return Self { window, double_groups, ..Self::default() };
+            return Self { window, double_groups: double_groups(&rectangle, planes, filters), ..Self::default() };
         }
-        let of_group = |(n, (mut sums, planes)): (usize, (Zeroed<f32>, &[PlaneSums]))| {
-            let numbered = (n * TOGETHER..).zip(planes.iter().zip(sums.chunks_exact_mut(rectangle.area().max(1))));
+        let of_group = |(n, (sums, planes)): (usize, (Zeroed<f32>, &[PlaneSums]))| {
+            let numbered = (n * TOGETHER..).zip(planes.iter().zip(sums.chunks_exact(rectangle.area().max(1))));
             let with_sums: Vec<_> = numbered.filter(|(_, (plane, _))| plane.has_single).collect();
-            let filter = |(number, (_, sums))| Rows::new(&rectangle, number, sums, along);
-            let rows: Vec<Rows<'_, f32>> = with_sums.into_par_iter().map(filter).collect();
-            (!rows.is_empty()).then(|| group(&rectangle, &rows, across))
+            let rows = with_sums.into_par_iter().map(|(number, (_, sums))| Rows::new(&rectangle, number, sums));
+            let rows: Vec<Rows<'_, f32>> = rows.collect();
+            (!rows.is_empty()).then(|| group(&rows, filters))
         };
         let groups = single.into_iter().zip(planes.chunks(TOGETHER)).enumerate().filter_map(of_group).collect();
         let doubles = planes.into_par_iter().enumerate();
         let doubles = doubles.filter_map(|(number, PlaneSums { double, .. })| Some((number, double?)));
-        let filter = |(number, mut sums): (usize, Aligned<f64>)| {
-            (number, filter_all_rows(&rectangle, &Rows::new(&rectangle, number, &mut sums, along), across))
+        let filter = |(number, sums): (usize, Aligned<f64>)| {
+            (number, filter_plane(&Rows::new(&rectangle, number, &sums), filters))
         };
         Self { window, groups, double_groups: Vec::new(), doubles: doubles.map(filter).collect() }
     }
 }
 
 impl Window {
+    /// The rectangle with `more` cells on each side along u and v.
+    pub(super) fn grown(&self, more: [usize; 2]) -> Self {
+        let (first, size) = (self.first, self.size);
+        Self { first: [0, 1].map(|i| first[i] - more[i] as isize), size: [0, 1].map(|i| size[i] + 2 * more[i]) }
+    }
+
+    /// The part of this rectangle that lies in another one.
+    pub(super) fn within(&self, other: &Self) -> Self {
+        let first = [0, 1].map(|i| self.first[i].max(other.first[i]));
+        let end = |window: &Self, i: usize| window.first[i] + window.size[i] as isize;
+        Self { first, size: [0, 1].map(|i| (end(self, i).min(end(other, i)) - first[i]).max(0) as usize) }
+    }
+
     /// The part of this rectangle that lies in another one: its columns and rows here, and the first of them there.
     pub(super) fn part_in(&self, other: &Self) -> [(Range<usize>, usize); 2] {
         [0, 1].map(|i| {
@@ -106,123 +153,144 @@ impl<R: Real> Group<R> {
     }
 }
 
-/// A plane whose cells are side by side in rows, filtered along u.
-struct Rows<'a, R> {
-    number: usize,
-    sums: &'a [R],
-    /// The columns with sums in each row; empty for rows without any.
-    spans: Vec<Range<usize>>,
-}
-
 /// Filters planes whose sums are all in f64. The sums of a group are freed before the next group is filtered.
-fn double_groups(rectangle: &Rectangle, planes: Vec<PlaneSums>, [along, across]: &[Taps; 2]) -> Vec<Group<f64>> {
+fn double_groups(rectangle: &Rectangle, planes: Vec<PlaneSums>, filters: &Filters) -> Vec<Group<f64>> {
     let (mut groups, mut planes) = (Vec::new(), planes.into_iter().enumerate().peekable());
     while planes.peek().is_some() {
         let numbered = planes.by_ref().take(TOGETHER).filter_map(|(number, plane)| Some((number, plane.double?)));
-        let mut sums: Vec<(usize, Aligned<f64>)> = numbered.collect();
-        let rows = sums.par_iter_mut().map(|(number, sums)| Rows::new(rectangle, *number, sums, along));
+        let sums: Vec<(usize, Aligned<f64>)> = numbered.collect();
+        let rows = sums.par_iter().map(|(number, sums)| Rows::new(rectangle, *number, sums));
         let rows: Vec<Rows<'_, f64>> = rows.filter(Rows::has_sums).collect();
-        groups.extend((!rows.is_empty()).then(|| group(rectangle, &rows, across)));
+        groups.extend((!rows.is_empty()).then(|| group(&rows, filters)));
     }
     groups
 }
 
-/// Filters planes along v, and puts them side by side.
-fn group<R: Real>(rectangle: &Rectangle, planes: &[Rows<'_, R>], taps: &Taps) -> Group<R> {
-    let taps = taps.map(R::from_f64);
-    let [width, height] = rectangle.size;
+/// Filters planes, and puts them side by side.
+fn group<R: Real>(planes: &[Rows<'_, R>], filters: &Filters) -> Group<R> {
+    let [width, height] = filters.window.size;
     let (stride, places) = (width + 1, places(planes.len()));
     let mut cells = Zeroed::new(stride * height * places);
-    cells.par_chunks_exact_mut((stride * places).max(1)).enumerate().for_each(|(v, cells)| {
-        let mut row = vec![R::default(); width];
+    let rows = cells.par_chunks_exact_mut(stride * places).enumerate();
+    rows.for_each_init(RowScratch::default, |scratch, (v, cells)| {
         for (place, plane) in planes.iter().enumerate() {
-            if plane.is_near(v) {
-                plane.filter_row(v, width, &taps, &mut row);
-                cells[place..].iter_mut().step_by(places).zip(&row).for_each(|(to, from)| *to = *from);
-            }
+            let columns = plane.columns(v, filters);
+            let filtered = plane.filter_row(v, &columns, filters, scratch);
+            cells[columns.start * places + place..]
+                .iter_mut()
+                .step_by(places)
+                .zip(filtered)
+                .for_each(|(to, n)| *to = *n);
         }
     });
-    let spans = planes.iter().map(Rows::spread_spans).collect();
-    Group { planes: planes.iter().map(|plane| plane.number).collect(), places, stride, cells, spans }
+    let spans = planes.iter().map(|plane| (0..height).map(|v| plane.columns(v, filters)).collect());
+    Group { planes: planes.iter().map(|plane| plane.number).collect(), places, stride, spans: spans.collect(), cells }
 }
 
-/// Filters a plane along v.
-fn filter_all_rows(rectangle: &Rectangle, plane: &Rows<'_, f64>, taps: &Taps) -> Vec<f64> {
-    let [width, height] = rectangle.size;
-    let mut out = vec![0.0; width * height];
-    let rows = out.chunks_exact_mut(width.max(1)).enumerate().filter(|(v, _)| plane.is_near(*v));
-    rows.for_each(|(v, row)| plane.filter_row(v, width, taps, row));
+/// Filters a plane.
+fn filter_plane(plane: &Rows<'_, f64>, filters: &Filters) -> Vec<f64> {
+    let [width, height] = filters.window.size;
+    let (mut out, mut scratch) = (vec![0.0; width * height], RowScratch::default());
+    for (v, row) in out.chunks_exact_mut(width.max(1)).enumerate() {
+        let columns = plane.columns(v, filters);
+        let filtered = plane.filter_row(v, &columns, filters, &mut scratch);
+        row[columns].copy_from_slice(filtered);
+    }
     out
 }
 
+/// The rows of a plane, in the layout of its rectangle.
+struct Rows<'a, R> {
+    number: usize,
+    rectangle: &'a Rectangle,
+    sums: &'a [R],
+    /// For each row, the cells of the phases' runs from the first to the last one with sums in any phase.
+    spans: Vec<Range<usize>>,
+}
+
 impl<'a, R: Real> Rows<'a, R> {
-    /// Puts the cells of all phases of a plane side by side, and filters them along u.
-    fn new(rectangle: &Rectangle, number: usize, sums: &'a mut [R], taps: &Taps) -> Self {
-        let (width, taps) = (rectangle.size[0], taps.map(R::from_f64));
-        let mut wide = vec![R::default(); width + 2 * HALF];
-        let of_row = |row: &mut [R]| {
-            interleave(row, rectangle, &mut wide[HALF..][..width]);
-            let span = span(&wide[HALF..][..width]);
-            if span.is_empty() {
-                return span;
-            }
-            dispatch!(filter_along(&wide[..], &taps, &mut *row));
-            span.start.saturating_sub(HALF)..(span.end + HALF).min(width)
-        };
-        let spans = sums.chunks_exact_mut(width.max(1)).map(of_row).collect();
-        Self { number, sums, spans }
+    fn new(rectangle: &'a Rectangle, number: usize, sums: &'a [R]) -> Self {
+        let of_row = |row: &[R]| row.chunks_exact(rectangle.run).map(span).fold(0..0, |a, b| join(a, &b));
+        let spans = sums.chunks_exact(rectangle.size[0].max(1)).map(of_row).collect();
+        Self { number, rectangle, sums, spans }
     }
 
     fn has_sums(&self) -> bool {
         self.spans.iter().any(|span| !span.is_empty())
     }
 
-    /// The rows that reach row v through the filter.
+    /// The cells of runs with sums in the rows that reach row v through the filter along v.
     fn near(&self, v: usize) -> Range<usize> {
-        v.saturating_sub(HALF)..(v + HALF + 1).min(self.spans.len())
+        let rows = v.saturating_sub(HALF)..(v + HALF + 1).min(self.spans.len());
+        self.spans[rows].iter().fold(0..0, join)
     }
 
-    fn is_near(&self, v: usize) -> bool {
-        self.spans[self.near(v)].iter().any(|span| !span.is_empty())
+    /// The columns with sums in row v after both filters.
+    fn columns(&self, v: usize, filters: &Filters) -> Range<usize> {
+        let (near, phases, Along { start, taps }) = (self.near(v), self.rectangle.phases, &filters.along[v]);
+        let (half, width) = (taps.half() as isize, filters.window.size[0] as isize);
+        let within = |column: usize, more: isize| (column as isize + more - start).clamp(0, width) as usize;
+        if near.is_empty() { 0..0 } else { within(near.start * phases, -half)..within(near.end * phases, half) }
     }
 
-    /// For each row, the columns with sums after the filter along v.
-    fn spread_spans(&self) -> Vec<Range<usize>> {
-        let join = |a: Range<usize>, b: &Range<usize>| match (a.is_empty(), b.is_empty()) {
-            (true, _) => b.clone(),
-            (_, true) => a,
-            _ => a.start.min(b.start)..a.end.max(b.end),
-        };
-        (0..self.spans.len()).map(|v| self.spans[self.near(v)].iter().fold(0..0, join)).collect()
+    /// Filters row v along v, then these columns of it along u. Rows and columns outside count as zeros.
+    fn filter_row<'s>(
+        &self,
+        v: usize,
+        columns: &Range<usize>,
+        filters: &Filters,
+        scratch: &'s mut RowScratch<R>,
+    ) -> &'s [R] {
+        if columns.is_empty() {
+            return &[];
+        }
+        let (near, Along { start, taps }) = (self.near(v), &filters.along[v]);
+        // Before and after the sums, as many zeros as the filter reaches twice, and those of a last line.
+        let (half, width) = (taps.half(), near.len() * self.rectangle.phases);
+        let RowScratch { phase, row, out } = scratch;
+        row.clear();
+        row.resize(width + 4 * half + LINE, R::default());
+        self.filter_across(v, &near, &filters.across, phase, &mut row[2 * half..][..width]);
+        let first = near.start * self.rectangle.phases;
+        let from = &row[(columns.start as isize + start + half as isize) as usize - first..];
+        out.resize(columns.len().next_multiple_of(LINE), R::default());
+        match taps {
+            AlongTaps::Still(taps) => dispatch!(filter_along(from, &taps.map(R::from_f64), &mut out[..])),
+            AlongTaps::Moving(taps) => dispatch!(filter_along(from, &taps.map(R::from_f64), &mut out[..])),
+        }
+        &out[..columns.len()]
     }
 
-    /// Filters the rows around row v; rows outside count as zeros.
-    fn filter_row(&self, v: usize, width: usize, taps: &[R; HALF + 1], out: &mut [R]) {
-        let row = |v: Option<usize>| v.and_then(|v| self.sums.get(v * width..(v + 1) * width));
-        let missing = v < HALF || row(Some(v + HALF)).is_none();
-        let zeros = if missing { vec![R::default(); width] } else { Vec::new() };
-        let at = |v: Option<usize>| row(v).unwrap_or(&zeros);
-        dispatch!(filter_across(std::array::from_fn(|n| at((v + n).checked_sub(HALF))), taps, out));
-    }
-}
-
-/// Puts the cells of all phases of a row side by side.
-fn interleave<R: Real>(from: &[R], rectangle: &Rectangle, to: &mut [R]) {
-    match rectangle.phases {
-        2 => dispatch!(interleave_two(from, rectangle.run, to)),
-        phases => {
-            for (phase, run) in from.chunks_exact(rectangle.run).enumerate() {
-                to[phase..].iter_mut().step_by(phases).zip(run).for_each(|(to, from)| *to = *from);
-            }
+    /// Filters row v along v, and puts the cells `near` of all phases side by side.
+    fn filter_across(&self, v: usize, near: &Range<usize>, taps: &Taps, phase: &mut Vec<R>, out: &mut [R]) {
+        let Rectangle { size: [width, _], phases, run, .. } = *self.rectangle;
+        let (taps, zeros) = (taps.map(R::from_f64), vec![R::default(); near.len()]);
+        phase.resize(near.len(), R::default());
+        for n in 0..phases {
+            let row = |j: usize| {
+                let v = (v + j).checked_sub(HALF).filter(|v| *v < self.spans.len());
+                v.map_or(&zeros[..], |v| &self.sums[v * width + n * run..][near.clone()])
+            };
+            dispatch!(sum_of_products(std::array::from_fn(row), &taps, &mut phase[..]));
+            out[n..].iter_mut().step_by(phases).zip(&*phase).for_each(|(to, from)| *to = *from);
         }
     }
 }
 
-#[inline(always)]
-fn interleave_two<R: Real>(from: &[R], run: usize, to: &mut [R]) {
-    let (even, odd) = from[..2 * run].split_at(run);
-    for ((to, even), odd) in to.as_chunks_mut::<2>().0.iter_mut().zip(even).zip(odd) {
-        *to = [*even, *odd];
+/// Scratch for a row: a phase and all phases after the filter along v, and the row after both filters.
+#[derive(Default)]
+struct RowScratch<R> {
+    phase: Vec<R>,
+    row: Vec<R>,
+    out: Vec<R>,
+}
+
+/// The smallest range that holds both.
+fn join(a: Range<usize>, b: &Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b.clone(),
+        (_, true) => a,
+        _ => a.start.min(b.start)..a.end.max(b.end),
     }
 }
 
@@ -236,32 +304,23 @@ fn span<R: Real>(numbers: &[R]) -> Range<usize> {
     first * LANES..((last + 1) * LANES).min(numbers.len())
 }
 
-/// Filters a row, which has [`HALF`] more cells on both sides.
+/// Filters a row, from half of the taps before the first filtered one on.
 #[inline(always)]
-fn filter_along<R: Real>(row: &[R], taps: &[R; HALF + 1], to: &mut [R]) {
+fn filter_along<R: Real, const N: usize>(row: &[R], taps: &[R; N], to: &mut [R]) {
     let width = to.len();
     sum_of_products(std::array::from_fn(|n| &row[n..][..width]), taps, to);
 }
 
-/// Filters the middle one of 2 [`HALF`] + 1 rows.
+/// out = sum over j of f_j x_j, a line at a time                                                            (eq 36)
 #[inline(always)]
-fn filter_across<R: Real>(rows: [&[R]; 2 * HALF + 1], taps: &[R; HALF + 1], to: &mut [R]) {
-    sum_of_products(rows, taps, to);
-}
-
-/// out = f_0 x_0 + sum over j of f_j (x_-j + x_j), a line at a time                                       (eq 36)
-#[inline(always)]
-fn sum_of_products<R: Real>(rows: [&[R]; 2 * HALF + 1], taps: &[R; HALF + 1], to: &mut [R]) {
-    let rows: [&[[R; LINE]]; 2 * HALF + 1] = rows.map(|row| row.as_chunks().0);
+fn sum_of_products<R: Real, const N: usize>(rows: [&[R]; N], taps: &[R; N], to: &mut [R]) {
+    let rows: [&[[R; LINE]]; N] = rows.map(|row| row.as_chunks().0);
     for (i, to) in to.as_chunks_mut::<LINE>().0.iter_mut().enumerate() {
-        let mut sums = rows[HALF][i];
-        for sum in &mut sums {
-            *sum = taps[0] * *sum;
-        }
-        for j in 1..=HALF {
-            let (before, after) = (&rows[HALF - j][i], &rows[HALF + j][i]);
+        let mut sums = [R::default(); LINE];
+        for j in 0..N {
+            let numbers = &rows[j][i];
             for l in 0..LINE {
-                sums[l] = sums[l] + taps[j] * (before[l] + after[l]);
+                sums[l] = sums[l] + taps[j] * numbers[l];
             }
         }
         *to = sums;

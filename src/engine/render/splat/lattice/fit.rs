@@ -12,7 +12,7 @@
 //! This is the projection of the Gaussian onto the shifts of g. The condition keeps constants exact. The products of
 //! Gaussians have integrals in closed form, so weights take a few equations per position.
 
-use super::prefilter::{HALF, Taps, solve, taps, total};
+use super::prefilter::{HALF, Prefilter, Taps, solve};
 
 /// The largest number of cells that a voxel is spread to along an axis.
 pub(super) const MOST_WIDTH: usize = 6;
@@ -47,7 +47,7 @@ pub(super) struct AxisFit {
 impl AxisFit {
     /// Spreading to `width` cells, for a Gaussian with a standard deviation of `sigma` cells.
     pub(super) fn new(width: usize, sigma: f64) -> Self {
-        let taps = taps(width, sigma);
+        let taps = Prefilter::new(width, sigma).taps(0.0);
         let of_pair = |d: f64| both(|j| both(|l| tap(&taps, j) * tap(&taps, l) * overlap(d + (j - l) as f64, sigma)));
         let by_distance: Vec<f64> = (0..width).map(|d| of_pair(d as f64)).collect();
         let product = |c: usize, d: usize| {
@@ -73,15 +73,15 @@ impl AxisFit {
         let wanted = std::array::from_fn(|c| if c < self.width { with_voxel(c) } else { 0.0 });
         let mut weights = solve(self.products, wanted);
         let sum = |weights: &CellWeights| weights.iter().sum::<f64>();
-        let missing = (1.0 / total(&self.taps) - sum(&weights)) / sum(&self.level);
+        let missing = (1.0 / self.taps.iter().sum::<f64>() - sum(&weights)) / sum(&self.level);
         weights.iter_mut().zip(self.level).for_each(|(weight, level)| *weight += missing * level);
         Spread { first, weights }
     }
 }
 
-/// The tap of the j-th cell on either side.
+/// The tap of the cell j cells away.
 fn tap(taps: &Taps, j: isize) -> f64 {
-    taps[j.unsigned_abs()]
+    taps[(j + HALF as isize) as usize]
 }
 
 /// The sum over all taps.
@@ -112,7 +112,7 @@ mod tests {
             for position in [-3.75, -1.0, 0.0, 0.3, 0.5, 17.999] {
                 let Spread { first, weights } = fit.at(position);
                 let sum: f64 = weights.iter().sum();
-                assert!((sum * total(&fit.taps) - 1.0).abs() < 1e-9, "{width} {sigma} {position}");
+                assert!((sum * fit.taps.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{width} {sigma} {position}");
                 let mirrored = fit.at(-position);
                 let weight = |spread: &Spread, cell: isize| {
                     usize::try_from(cell - spread.first)

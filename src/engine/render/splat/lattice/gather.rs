@@ -1,12 +1,8 @@
 //! Gathers the pixels of a tile from its filtered cells: sums of cells times the kernel of eq 37.
-//!
-//! If a column of cells is upright in the picture, the kernel is a product: the columns are summed for a row of pixels
-//! first, then these sums along the row ([`TwoPasses`]). Otherwise each pixel sums all cells around it ([`OnePass`]).
 
 use super::bundle::{Bundles, TilePlane};
 use super::cells::TOGETHER;
-use super::filtered::{FilteredCells, Window};
-use super::one_pass::OnePass;
+use super::filtered::FilteredCells;
 use super::picture::Lattice;
 use super::two_passes::TwoPasses;
 use crate::render::splat::tile_rect::TileRect;
@@ -27,18 +23,12 @@ pub(in crate::render) struct Ones<'a> {
 /// The cells that the pixels of a tile need, with the planes that are not zero there.
 #[derive(Debug)]
 pub(in crate::render) struct Gather<'a> {
-    lattice: &'a Lattice,
+    /// f at its centre.
+    peak: f64,
     rect: &'a TileRect,
     ones: Option<Ones<'a>>,
     bundles: Bundles<'a>,
-    way: Way<'a>,
-}
-
-/// How pixels are summed.
-#[derive(Debug)]
-enum Way<'a> {
-    OnePass(OnePass),
-    TwoPasses(TwoPasses<'a>),
+    passes: TwoPasses<'a>,
 }
 
 impl<'a> Gather<'a> {
@@ -49,14 +39,10 @@ impl<'a> Gather<'a> {
         rect: &'a TileRect,
         ones: Option<Ones<'a>>,
     ) -> Self {
-        let (first, size) = lattice.cells_reached(&rect.x, &rect.y);
-        let tile = Window { first, size };
+        let tile = lattice.cells_reached(&rect.x, &rect.y);
         let bundles = Bundles::new(cells, &tile, ones.map(|ones| ones.cells));
-        let way = match &lattice.product {
-            Some(product) => Way::TwoPasses(TwoPasses::new(product, rect, &tile, &bundles)),
-            None => Way::OnePass(OnePass::new(&lattice.kernel)),
-        };
-        Self { lattice, rect, ones, bundles, way }
+        let passes = TwoPasses::new(&lattice.upright, rect, &tile, &bundles);
+        Self { peak: lattice.peak, rect, ones, bundles, passes }
     }
 
     /// The planes that are not zero in this tile.
@@ -70,22 +56,16 @@ impl<'a> Gather<'a> {
     pub(in crate::render) fn load(&mut self, first: usize, count: usize, planes: &mut [Lane]) {
         planes.fill(Lane::default());
         let Bundles { single, double } = &self.bundles;
-        let (pixel, peak) = (self.rect.pixel(first), self.lattice.peak);
+        let (pixel, peak) = (self.rect.pixel(first), self.peak);
         let ones = self.ones_at(pixel, count);
-        self.way.prepare(self.lattice, pixel, count, &self.bundles);
+        self.passes.sum_row(pixel[1], &self.bundles);
         let (mut sums, mut precise) = ([[0.0; TOGETHER]; LANES], [[0.0; TOGETHER]; LANES]);
         for (n, bundle) in single.iter().enumerate() {
-            match &self.way {
-                Way::OnePass(way) => way.sum(bundle, &mut sums[..count]),
-                Way::TwoPasses(way) => way.single(n, pixel[0], &mut sums[..count]),
-            }
+            self.passes.single(n, pixel[0], &mut sums[..count]);
             put(&bundle.planes, peak, &sums, &ones, planes);
         }
         for (n, bundle) in double.iter().enumerate() {
-            match &self.way {
-                Way::OnePass(way) => way.sum(bundle, &mut precise[..count]),
-                Way::TwoPasses(way) => way.double(n, pixel[0], &mut precise[..count]),
-            }
+            self.passes.double(n, pixel[0], &mut precise[..count]);
             put(&bundle.planes, peak, &precise, &ones, planes);
         }
     }
@@ -113,16 +93,6 @@ fn put<R: Real>(
         let plane = &mut planes[*number];
         for l in 0..LANES {
             plane[l] = sums[l][*place].to_f64() * factor + mean * ones[l];
-        }
-    }
-}
-
-impl Way<'_> {
-    /// Prepares for neighbouring pixels of a row.
-    fn prepare(&mut self, lattice: &Lattice, [x, y]: [usize; 2], count: usize, bundles: &Bundles<'_>) {
-        match self {
-            Way::OnePass(way) => way.weigh(lattice, [x, y], count),
-            Way::TwoPasses(way) => way.sum_row(y, bundles),
         }
     }
 }

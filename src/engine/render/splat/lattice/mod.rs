@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! values of a block, plane by plane     spread: to the cells around each voxel, by weights that are fitted
-//! cells of a band of the picture        filtered: a short filter undoes the blur of spreading
-//! filtered cells of a tile              gather: to pixels, by the Gaussian footprint
+//! cells of a band of the picture        filtered: a short filter undoes the blur of spreading, and moves rows
+//! filtered cells, columns upright       gather: to pixels, by the Gaussian footprint
 //! ```
 //!
 //! This is the lattice of the shear-warp factorization ([Lacroute](wavesplat_core::bibliography)): the voxels of a slice
@@ -26,10 +26,9 @@ mod cells;
 mod block_values;
 mod spread;
 mod filtered;
-mod product;
+mod upright;
 mod picture;
 mod bundle;
-mod one_pass;
 mod two_passes;
 mod gather;
 #[cfg(test)]
@@ -46,6 +45,7 @@ pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, SpreadScratch};
 
 use fit::{AxisFit, Spread};
+use prefilter::{MovingPrefilter, Prefilter};
 use std::sync::OnceLock;
 
 /// A way to spread voxels.
@@ -90,6 +90,8 @@ struct Spreading {
     sums: Sums,
     /// The weights and prefilters along u and v.
     fits: [AxisFit; 2],
+    /// The prefilters along u if rows of cells move (eq 46).
+    moving: Option<MovingPrefilter>,
     tau: f64,
     /// Slices of the grid.
     slices: usize,
@@ -101,7 +103,8 @@ impl Spreading {
     /// Spreads voxels for a Gaussian with these standard deviations in cells. The grid has `slices` slices.
     fn new(shear: Shear, choice: Choice, sigmas: [f64; 2], tau: f64, slices: usize) -> Self {
         let fits = sigmas.map(|sigma| AxisFit::new(choice.width, sigma));
-        Self { shear, sums: choice.sums, fits, tau, slices, spreads: OnceLock::new() }
+        let moving = (shear.lean() != 0.0).then(|| Prefilter::new(choice.width, sigmas[0]));
+        Self { shear, sums: choice.sums, fits, moving, tau, slices, spreads: OnceLock::new() }
     }
 
     /// Cells that a voxel is spread to along an axis.

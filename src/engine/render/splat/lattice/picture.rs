@@ -4,12 +4,12 @@
 use super::axis::Cut;
 use super::cells::{Cells, LINE, Rectangle};
 use super::error::{SliceError, Weighting};
-use super::filtered::{FilteredCells, Window, places, side_by_side};
-use super::fit::{AxisFit, MOST_WIDTH};
+use super::filtered::{Along, AlongTaps, FilteredCells, Filters, Window, places, side_by_side};
+use super::fit::MOST_WIDTH;
 use super::kernel::Kernel;
-use super::prefilter::HALF;
-use super::product::Product;
+use super::prefilter::{HALF, MOVING_HALF};
 use super::shear::Shear;
+use super::upright::{Move, Upright};
 use super::{Choice, Placed, Spreading, Sums};
 use crate::render::splat::tile_rect::{TILE, TileRect, WIDEST, pixels_around};
 use std::ops::Range;
@@ -22,21 +22,21 @@ use wavesplat_core::view::footprint::{Footprint, Kernel as Gaussian, Method};
 #[derive(Debug, Clone)]
 pub(in crate::render) struct Lattice {
     spreading: Arc<Spreading>,
-    pub(super) kernel: Kernel,
-    /// The kernel as a product, if it is one.
-    pub(super) product: Option<Product>,
+    kernel: Kernel,
+    pub(super) upright: Upright,
     /// Reach of the footprint in pixels: farther cells do not influence a pixel.
     reach: f64,
     /// f at its centre.
     pub(super) peak: f64,
     /// The largest number of additions for a cell of a plane.
     additions: usize,
-    /// The cells that any voxel reaches, prefilter included: the first along each axis, and their number.
-    bounds: ([isize; 2], [usize; 2]),
+    /// The cells that any voxel reaches, prefilter included, before and after rows move.
+    bounds: Window,
+    upright_bounds: Window,
 }
 
-/// A bound for a kernel, cells per voxel, and the spreading along u and v.
-type Bound = fn(&Weighting<'_>, usize, &[AxisFit; 2]) -> SliceError;
+/// A bound for a kernel and the spreading of voxels.
+type Bound = fn(&Weighting<'_>, &Spreading) -> SliceError;
 
 /// A view that may be splatted on a lattice.
 #[derive(Debug, Clone, Copy)]
@@ -81,11 +81,11 @@ const CHOICES: [Choice; 10] = [
 const STEEPEST: f64 = 0.5;
 /// The largest slope of slices, in voxels.
 const STEEPEST_SLOPE: f64 = 32.0;
-/// Beyond this number of cells per pixel, every pixel sums its own cells.
-const FAR: f64 = 8.0;
 /// The largest number of cells that a square tile reaches.
 const TILE_CELLS: usize = 4096;
-/// Width of a tile in units of its height, if pixels are summed in two passes.
+/// The largest number of cells that a wide tile reaches.
+const WIDEST_CELLS: usize = 16 * TILE_CELLS;
+/// Width of a tile in units of its height: the pixels of a row share the sums of columns.
 const WIDE: usize = 4;
 /// Heights of tiles. Bands begin at multiples of the largest sizes, so that tiles do not depend on bands.
 const SIDES: [usize; 5] = [32, 16, 8, 4, 2];
@@ -133,33 +133,30 @@ impl Lattice {
     fn new(choice: Choice, radius: f64, view: &SplattedView<'_>) -> Option<Self> {
         let sigma = view.sigma();
         let SplattedView { grid, clip, blocks, camera, footprint, .. } = *view;
-        let shear = Shear::new(camera, grid, choice.fineness);
+        let shear = Shear::new(camera, grid, choice.fineness).widened();
         let cut = Cut { radius, phases: choice.sums.phases() };
-        let kernel = Kernel::new(&shear, sigma, cut)?;
+        let (kernel, upright) = (Kernel::new(&shear, sigma), Upright::new(&shear, sigma, cut)?);
         let slices = grid.dims[shear.axes[2]];
         let spreading = Spreading::new(shear, choice, kernel.conditional_sigmas(), view.kernel.tau, slices);
-        let product = Product::new(&shear, sigma, cut).filter(|_| !is_far(&shear));
-        let reach = product.as_ref().map_or_else(|| kernel.reach(&shear, sigma), |product| product.reach(&shear));
-        let (peak, bounds) = (footprint.at_depth(0.0), Default::default());
+        let (reach, peak, bounds) = (upright.reach(), footprint.at_depth(0.0), Window::default());
         let additions = additions(clip, blocks, shear.axes[2]);
         let spreading = Arc::new(spreading);
-        let mut lattice = Self { spreading, kernel, product, reach, peak, additions, bounds };
+        let mut lattice = Self { spreading, kernel, upright, reach, peak, additions, bounds, upright_bounds: bounds };
         if !lattice.suits() || lattice.work(camera, clip) > view.footprint_work() {
             return None;
         }
         lattice.bounds = lattice.filtered_rectangle(clip);
+        lattice.upright_bounds = lattice.upright.window(&lattice.bounds);
         Some(lattice)
     }
 
     /// The error of a slice, by one of the bounds.
     fn slice_error(&self, bound: Bound) -> SliceError {
-        let cut = self.product.as_ref().map_or_else(|| self.kernel.cut(), Product::cut);
-        let Spreading { shear, fits, sums, .. } = self.spreading.as_ref();
-        let roundings = match sums {
+        let roundings = match self.spreading.sums {
             Sums::Single => self.additions + OTHERS + OF_A_WEIGHT,
             Sums::Double => OF_A_WEIGHT,
         };
-        bound(&Weighting { kernel: &self.kernel, cut, roundings }, shear.fineness, fits)
+        bound(&Weighting { kernel: &self.kernel, cut: self.upright.cut(), roundings }, &self.spreading)
     }
 
     fn suits(&self) -> bool {
@@ -167,7 +164,7 @@ impl Lattice {
             return false;
         }
         let depths = self.spreading.shear.depths.map(|z| (self.spreading.tau * z).abs());
-        let pixel = self.cells_reached(&(0..1), &(0..1)).1;
+        let pixel = self.cells_reached(&(0..1), &(0..1)).size;
         let steep = depths.into_iter().fold(0.0, f64::max) > STEEPEST;
         !steep && area(pixel) <= TILE_CELLS
     }
@@ -176,7 +173,7 @@ impl Lattice {
     fn is_tame(&self) -> bool {
         let shear = &self.spreading.shear;
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
-        let positions = [self.position([0.0; 2]), self.half()];
+        let positions = [self.before([0.0; 2]), self.upright.position([0.0; 2]), self.upright.half_before()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
         within(&shear.slopes, STEEPEST_SLOPE)
             && per_pixel.iter().all(|n| within(n, 1e6))
@@ -187,12 +184,12 @@ impl Lattice {
     fn work(&self, camera: &Camera, clip: &Region) -> f64 {
         let (width, q) = (self.spreading.width() as f64, self.spreading.shear.fineness as f64);
         let [b, c] = self.spreading.shear.pixels.map(|step| step.map(|pixels| pixels / q));
-        let volume = area(self.rectangle(clip).1) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
+        let volume = area(self.rectangle(clip).size) as f64 * (b[0] * c[1] - b[1] * c[0]).abs();
         let (pixels, tile) = (volume.min((camera.size[0] * camera.size[1]) as f64), self.tile());
         let copied = area(self.tile_cells(tile)) as f64 * pixels / area(tile) as f64;
         let tiles = camera.size[0].div_ceil(tile[0]) * camera.size[1].div_ceil(tile[1]);
         TILING * tiles as f64
-            + GATHERING * self.kernel.cells() as f64 * pixels
+            + GATHERING * self.upright.products() * pixels
             + COPYING * copied
             + SPREADING * clip.voxels() as f64 * width * (q + 1.0)
     }
@@ -203,12 +200,13 @@ impl Lattice {
         const VALUES: usize = 3; // in their own type, as f32, as f64
         const SUMS: usize = 2; // of a plane with sums in f64, and of ones
         let splatting = self.block_cells(block) + VALUES * block.voxels();
-        let columns = self.tile_cells(self.tile())[0];
-        splatting.max(columns * (side_by_side(planes) + self.kernel.cells()) + SUMS * self.most_tile_cells())
+        let (tile, Upright { along, across, .. }) = (self.tile(), &self.upright);
+        let of_columns = self.tile_cells(tile)[0] * (side_by_side(planes) + across.padded());
+        splatting.max(of_columns + tile[0] * along.padded() + SUMS * self.most_tile_cells())
     }
 
-    /// The cells that the voxels of a region reach: the first along each axis, and their number.
-    fn rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
+    /// The cells that the voxels of a region reach.
+    fn rectangle(&self, region: &Region) -> Window {
         let (mut low, mut high) = ([isize::MAX; 2], [isize::MIN; 2]);
         for corner in 0..8 {
             let at = |axis: usize| if corner >> axis & 1 == 0 { region.start[axis] } else { region.end[axis] - 1 };
@@ -218,42 +216,38 @@ impl Lattice {
         // One more cell covers rounding, and cells beyond the cut that count as well.
         let pad = 1;
         let size = |i: usize| (high[i] - low[i]) as usize + 2 * pad + self.spreading.width();
-        (low.map(|first| first - pad as isize), [size(0), size(1)])
+        Window { first: low.map(|first| first - pad as isize), size: [size(0), size(1)] }
     }
 
     /// The same, with the cells that the prefilter reaches.
-    fn filtered_rectangle(&self, region: &Region) -> ([isize; 2], [usize; 2]) {
-        let (first, size) = self.rectangle(region);
-        (first.map(|n| n - HALF as isize), size.map(|n| n + 2 * HALF))
+    fn filtered_rectangle(&self, region: &Region) -> Window {
+        self.rectangle(region).grown(self.filter_half())
     }
 
-    /// An upper bound of the distance from a pixel to any cell that counts, along u and v.
-    fn half(&self) -> [f64; 2] {
-        self.product.as_ref().map_or_else(|| self.kernel.half(), Product::half)
+    /// Cells to each side, along u and v, that a filtered cell is a sum of, and one more for moves.
+    fn filter_half(&self) -> [usize; 2] {
+        [if self.spreading.moving.is_some() { MOVING_HALF + 1 } else { HALF }, HALF]
     }
 
-    /// The cells of the centres of a rectangle of pixels: the first along each axis, and their number.
-    pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> ([isize; 2], [usize; 2]) {
-        let [x, y] = [x, y].map(|pixels| [pixels.start as f64 + 0.5, pixels.end as f64 - 0.5]);
-        let corners = x.into_iter().flat_map(|x| y.map(move |y| [x, y]));
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for position in corners.map(|pixel| self.position(pixel)) {
-            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
-        }
-        let half = self.half();
-        let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
-        (first, [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize))
+    /// The upright cells of the centres of a rectangle of pixels.
+    pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> Window {
+        around(x, y, self.upright.half(), |pixel| self.upright.position(pixel))
     }
 
-    /// Converts a position in pixels to cells.
-    pub(super) fn position(&self, pixel: [f64; 2]) -> [f64; 2] {
+    /// The cells before rows move of the centres of a rectangle of pixels, and those that the prefilter reaches.
+    fn cells_before(&self, x: &Range<usize>, y: &Range<usize>) -> Window {
+        around(x, y, self.upright.half_before(), |pixel| self.before(pixel)).grown(self.filter_half())
+    }
+
+    /// Converts a position in pixels to cells before rows move.
+    fn before(&self, pixel: [f64; 2]) -> [f64; 2] {
         let shear = &self.spreading.shear;
         shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]))
     }
 
     /// The columns and rows of the picture that a block can reach. Both are empty if either is.
     pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
-        let (first, cells) = self.filtered_rectangle(region);
+        let Window { first, size: cells } = self.filtered_rectangle(region);
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
         pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
     }
@@ -261,10 +255,9 @@ impl Lattice {
     /// Whether a block adds to any cell that the tiles of these pixels read. Tiles take the mean of all cells that they read, also
     /// of those that no pixel uses ([`super::bundle`]), so bands must not leave such a block out.
     pub(in crate::render) fn tiles_read(&self, region: &Region, pixels: &TileRect) -> bool {
-        let window = |(first, size): ([isize; 2], [usize; 2])| Window { first, size };
-        let block = window(self.filtered_rectangle(region));
+        let block = self.upright.window(&self.filtered_rectangle(region));
         pixels.cover(self.tile()).iter().any(|tile| {
-            let tile = window(self.cells_reached(&tile.x, &tile.y));
+            let tile = self.cells_reached(&tile.x, &tile.y);
             block.part_in(&tile).iter().all(|(cells, _)| !cells.is_empty())
         })
     }
@@ -276,29 +269,39 @@ impl Lattice {
 
     /// The cells of a band of a picture, with all planes at zero.
     pub(in crate::render) fn cells_of(&self, band: &TileRect, planes: usize) -> Cells {
-        let ((first, size), (low, most)) = (self.cells_reached(&band.x, &band.y), self.bounds);
-        let start = [0, 1].map(|i| (first[i] - HALF as isize).max(low[i]));
-        let end = |i: usize| (first[i] + (size[i] + HALF) as isize).min(low[i] + most[i] as isize);
-        let (first, size) = (start, [0, 1].map(|i| (end(i) - start[i]).max(0) as usize));
+        let Window { first, size } = self.cells_before(&band.x, &band.y).within(&self.bounds);
         Cells::new(Rectangle::holding(first, size, self.spreading.shear.fineness), planes, self.spreading.sums)
     }
 
     /// The filtered cells of a band.
-    pub(in crate::render) fn filter(&self, cells: Cells) -> FilteredCells {
-        FilteredCells::new(cells, &self.spreading.fits.each_ref().map(|fit| fit.taps))
+    pub(in crate::render) fn filter(&self, cells: Cells, band: &TileRect) -> FilteredCells {
+        let (rectangle, spreading) = (cells.rectangle(), &self.spreading);
+        let [along, across] = &spreading.fits;
+        let Window { first: [u, _], size: [width, _] } =
+            self.cells_reached(&band.x, &band.y).within(&self.upright_bounds);
+        let of_row = |v: isize| {
+            let Move { cells, rest } = self.upright.moved(v);
+            let still = || AlongTaps::Still(along.taps);
+            let taps = spreading.moving.as_ref().map_or_else(still, |moving| AlongTaps::Moving(moving.taps(rest)));
+            Along { start: u + cells - rectangle.first[0], taps }
+        };
+        let rows = rectangle.first[1]..rectangle.first[1] + rectangle.size[1] as isize;
+        let window = Window { first: [u, rows.start], size: [width, rectangle.size[1]] };
+        FilteredCells::new(cells, &Filters { across: across.taps, along: rows.map(of_row).collect(), window })
     }
 
-    /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. In two passes,
-    /// the pixels of a row share the sums of columns, so tiles are wide.
+    /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. The pixels of a row
+    /// share the sums of columns, so tiles are wide.
     pub(in crate::render) fn tile(&self) -> [usize; 2] {
         let fits = |side: &usize| area(self.tile_cells([*side; 2])) <= TILE_CELLS;
         let side = SIDES.into_iter().find(fits).unwrap_or(1);
-        [if self.product.is_some() { WIDE * side } else { side }, side]
+        let wide = |width: &usize| area(self.tile_cells([*width, side])) <= WIDEST_CELLS;
+        [[WIDE * side, side].into_iter().find(wide).unwrap_or(side), side]
     }
 
     /// Cells along u and v that a tile reaches.
     fn tile_cells(&self, [width, height]: [usize; 2]) -> [usize; 2] {
-        self.cells_reached(&(0..width), &(0..height)).1
+        self.cells_reached(&(0..width), &(0..height)).size
     }
 
     /// An upper bound of the cells that any tile reaches.
@@ -331,15 +334,19 @@ impl Lattice {
         self.band_cells(size) * size_of::<f64>()
     }
 
-    /// An upper bound of the cells of a plane of a band.
+    /// An upper bound of the cells of a plane of a band, before and after rows move.
     fn band_cells(&self, [width, height]: [usize; 2]) -> usize {
-        let (size, most) = (self.cells_reached(&(0..width), &(0..height)).1, self.bounds.1);
-        self.held([0, 1].map(|i| (size[i] + 2 * HALF + 2).min(most[i]))) // covers rounding and any band position
+        let (x, y) = (0..width, 0..height);
+        // Two more cells cover rounding and any position of the band.
+        let most = |reached: Window, bounds: &Window| [0, 1].map(|i| (reached.size[i] + 2).min(bounds.size[i]));
+        let before = most(self.cells_before(&x, &y), &self.bounds);
+        let [columns, _] = most(self.cells_reached(&x, &y), &self.upright_bounds);
+        self.held(before).max((columns + 1) * before[1])
     }
 
     /// An upper bound of the cells of a plane of a block.
     pub(in crate::render) fn block_cells(&self, region: &Region) -> usize {
-        let size = self.rectangle(region).1;
+        let size = self.rectangle(region).size;
         self.held(size.map(|n| n + MOST_WIDTH - 1 + self.spreading.shear.fineness))
     }
 
@@ -347,6 +354,18 @@ impl Lattice {
     fn held(&self, size: [usize; 2]) -> usize {
         (size[0] + 3 * self.spreading.shear.fineness * LINE) * size[1]
     }
+}
+
+/// The cells within `half` cells of the centres of a rectangle of pixels, whose positions in cells `position` gives.
+fn around(x: &Range<usize>, y: &Range<usize>, half: [f64; 2], position: impl Fn([f64; 2]) -> [f64; 2]) -> Window {
+    let [x, y] = [x, y].map(|pixels| [pixels.start as f64 + 0.5, pixels.end as f64 - 0.5]);
+    let corners = x.into_iter().flat_map(|x| y.map(move |y| [x, y]));
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for position in corners.map(position) {
+        (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
+    }
+    let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
+    Window { first, size: [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize) }
 }
 
 /// The choice for a quick look, and the cut of its kernel in standard deviations.
@@ -379,11 +398,6 @@ fn additions(clip: &Region, blocks: BlockGrid, axis: usize) -> usize {
     let dims = clip.dims();
     let met: usize = (0..3).map(|a| dims[a].div_ceil(blocks.edges[a]) + 1).sum();
     blocks.edges[axis].min(dims[axis]) + 2 * MOST_WIDTH + 4 * met
-}
-
-/// Whether a step of a pixel passes so many cells that the pixels of a row share few of them.
-fn is_far(shear: &Shear) -> bool {
-    shear.cells([1.0, 0.0])[0].abs() > FAR
 }
 
 fn area([width, height]: [usize; 2]) -> usize {

@@ -1,49 +1,62 @@
-//! The prefilter of the cells: a short symmetric filter along each axis that undoes the blur of spreading.
+//! The prefilter of the cells: a short filter along each axis that undoes the blur of spreading.
 //!
 //! Pixels gather from the cells with the Gaussian itself, whose spectrum is g(k) = exp(-2 pi^2 sigma^2 k^2), with k in
 //! cycles per cell. If voxels were spread by a bump with the spectrum phi, the filter F would have to be near 1 / phi
-//! where g is large, and small where phi repeats. Its taps minimize
+//! where g is large, and small where phi repeats. Rows of cells may have to move by a share d of a cell, at most a half,
+//! for columns to be upright ([`super::upright`]). The same filter moves them: its taps minimize
 //!
 //! ```text
-//! integral over k of ((1 - F(k) phi(k))^2 + F(k)^2 (phi(k - 1)^2 + phi(k + 1)^2)) g(k)^2 / k^4            (eq 36)
-//! F(k) = sum of f_j cos(2 pi j k)                 phi(k) = sinh(r) / r, r^2 = b^2 - (pi n k)^2, phi(0) = 1
+//! integral over k of (|e^(-2 pi i d k) - F(k) phi(k)|^2 + |F(k)|^2 (phi(k - 1)^2 + phi(k + 1)^2)) g(k)^1.5 / k^4  (eq 36)
+//! F(k) = sum of f_j e^(-2 pi i j k)               phi(k) = sinh(r) / r, r^2 = b^2 - (pi n k)^2, phi(0) = 1
 //! ```
 //!
 //! phi is the spectrum of the Kaiser-Bessel bump of n cells, which is nearly the best for spreading
 //! ([Barnett](wavesplat_core::bibliography)). The factor 1 / k^4 makes constants and slopes nearly exact. The weights
-//! that spread a voxel are then fitted to the filter ([`super::fit`]).
+//! that spread a voxel are then fitted to the filter that moves nothing ([`super::fit`]).
 
 use std::f64::consts::PI;
 
-/// Cells to each side of a filtered cell.
+/// Cells to each side of a filtered cell in rows that do not move, and in those that do: a filter that moves cells by half
+/// of one has taps that fall off slowly.
 pub(super) const HALF: usize = 7;
+pub(super) const MOVING_HALF: usize = 8;
 
-/// The taps of the filter: of the cell itself, of its neighbours, of the next ones, ...
-pub(super) type Taps = [f64; HALF + 1];
+/// The taps of a filter that moves nothing, from [`HALF`] cells before the filtered cell on, and of one that moves cells.
+pub(super) type Taps = [f64; 2 * HALF + 1];
+pub(super) type MovingTaps = [f64; 2 * MOVING_HALF + 1];
 
-/// The filter for voxels spread to `width` cells that are gathered by a Gaussian with a standard deviation of `sigma`
-/// cells (eq 36).
-pub(super) fn taps(width: usize, sigma: f64) -> Taps {
-    let (mut matrix, mut right) = ([[0.0; HALF + 1]; HALF + 1], Taps::default());
-    for n in 0..SAMPLES {
-        let k = (n as f64 + 0.5) / (2 * SAMPLES) as f64;
-        let (cosines, [here, repeated]) = (cosines(k), bump(width, k));
-        let weight = weight(k, sigma);
-        for i in 0..=HALF {
-            right[i] += weight * cosines[i] * here;
-            for j in 0..=HALF {
-                matrix[i][j] += weight * cosines[i] * cosines[j] * (here * here + repeated);
-            }
-        }
-    }
-    let taps = solve(matrix, right);
-    let total = total(&taps);
-    taps.map(|tap| f64::from((tap / total) as f32))
+/// The filters of `N` taps along an axis.
+#[derive(Debug, Clone)]
+pub(super) struct Prefilter<const N: usize> {
+    /// The equations of eq 36, the same for all d.
+    matrix: [[f64; N]; N],
+    /// phi(k) times the weight of k, for the samples of the integral.
+    wanted: Vec<f64>,
 }
 
-/// The sum of all taps.
-pub(super) fn total(taps: &Taps) -> f64 {
-    taps[0] + 2.0 * taps[1..].iter().sum::<f64>()
+impl<const N: usize> Prefilter<N> {
+    /// The filters for voxels spread to `width` cells that are gathered by a Gaussian with a standard deviation of `sigma`
+    /// cells.
+    pub(super) fn new(width: usize, sigma: f64) -> Self {
+        let (mut passed, mut wanted) = (Vec::with_capacity(SAMPLES), Vec::with_capacity(SAMPLES));
+        for n in 0..SAMPLES {
+            let k = (n as f64 + 0.5) * SPACING;
+            let ([here, repeated], weight) = (bump(width, k), weight(k, sigma));
+            passed.push(weight * (here * here + repeated));
+            wanted.push(weight * here);
+        }
+        let products: [f64; N] = transformed(&passed, 0.0);
+        Self { matrix: std::array::from_fn(|i| std::array::from_fn(|j| products[i.abs_diff(j)])), wanted }
+    }
+
+    /// The filter that moves cells by `shift` cells, 0.5 at most (eq 36). Its sum is 1.
+    pub(super) fn taps(&self, shift: f64) -> [f64; N] {
+        let moved_by = |shift: f64| solve(self.matrix, transformed(&self.wanted, shift + (N / 2) as f64));
+        let (taps, mirrored) = (moved_by(shift), moved_by(-shift));
+        let both: [f64; N] = std::array::from_fn(|j| taps[j] + mirrored[N - 1 - j]); // the same but for rounding
+        let total: f64 = both.iter().sum();
+        both.map(|tap| f64::from((tap / total) as f32))
+    }
 }
 
 /// phi(k), and the square of its repetitions, both relative to phi(0).
@@ -58,29 +71,36 @@ fn bump(width: usize, k: f64) -> [f64; 2] {
     [phi(k), phi(k - 1.0).powi(2) + phi(k + 1.0).powi(2)]
 }
 
-/// The spectra of the cell's own tap and of each pair of taps.
-fn cosines(k: f64) -> Taps {
-    let first = 2.0 * libm::cos(2.0 * PI * k);
-    let mut spectra = [first; HALF + 1];
-    let mut last = 2.0;
-    for j in 2..=HALF {
-        spectra[j] = first * spectra[j - 1] - last;
-        last = spectra[j - 1];
+/// The sum over all samples k of `numbers` times cos(2 pi k (j - start)), for j = 0, 1, ...
+fn transformed<const N: usize>(numbers: &[f64], start: f64) -> [f64; N] {
+    let steps: [f64; N] = std::array::from_fn(|j| 2.0 * PI * SPACING * (j as f64 - start));
+    let twice = steps.map(|step| 2.0 * libm::cos(step));
+    // The samples before the first one and the first one lie at -1/2 and 1/2 steps.
+    let mut before = steps.map(|step| libm::cos(0.5 * step));
+    let (mut waves, mut sums) = (before, [0.0; N]);
+    for number in numbers {
+        for j in 0..N {
+            sums[j] += number * waves[j];
+            (before[j], waves[j]) = (waves[j], twice[j] * waves[j] - before[j]);
+        }
     }
-    spectra[0] = 1.0;
-    spectra
+    sums
 }
 
-/// g^2 / k^4, limited at both ends.
+/// g^1.5 / k^4, limited at both ends. The power gives the smallest errors, by trials.
 fn weight(k: f64, sigma: f64) -> f64 {
-    let gaussian = libm::exp(-2.0 * (PI * k * sigma).powi(2));
-    (gaussian * gaussian + LEAST) / ((k * k + 1e-4) * (k * k + 1e-3))
+    let power = libm::exp(-3.0 * (PI * k * sigma).powi(2));
+    (power + LEAST) / ((k * k + 1e-4) * (k * k + 1e-3))
 }
 
-/// Samples of the integral.
+/// Samples of the integral, and the distance between them in cycles a cell.
 const SAMPLES: usize = 400;
+const SPACING: f64 = 0.5 / SAMPLES as f64;
 /// The least weight of high frequencies, so that no tap is arbitrary.
-const LEAST: f64 = 1e-7;
+const LEAST: f64 = 1e-8;
+
+/// The filters of rows that move.
+pub(super) type MovingPrefilter = Prefilter<{ 2 * MOVING_HALF + 1 }>;
 
 /// Solves symmetric positive definite equations by elimination.
 pub(super) fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; N]) -> [f64; N] {
@@ -103,16 +123,30 @@ pub(super) fn solve<const N: usize>(mut matrix: [[f64; N]; N], mut right: [f64; 
 mod tests {
     use super::*;
 
+    /// By how much a wave of k cycles a cell is off that passes a bump, a filter of these taps, and a Gaussian.
+    fn off(taps: &[f64], [shift, k, bump, sigma]: [f64; 4]) -> f64 {
+        let sum = |wave: fn(f64) -> f64| {
+            let at = |j: usize| wave(2.0 * PI * k * (j as f64 - (taps.len() / 2) as f64 - shift));
+            taps.iter().enumerate().map(|(j, tap)| tap * at(j)).sum::<f64>()
+        };
+        (sum(f64::cos) * bump - 1.0).hypot(sum(f64::sin) * bump) * (-2.0 * (PI * k * sigma).powi(2)).exp()
+    }
+
     #[test]
     fn filtered_bumps_pass_what_a_gaussian_passes() {
         for (width, sigma, most) in [(4, 1.5, 4e-4), (5, 1.5, 2e-4), (5, 2.25, 2e-5), (6, 2.25, 1e-5), (6, 3.0, 5e-6)] {
-            let taps = taps(width, sigma);
-            assert!((total(&taps) - 1.0).abs() < 1e-6);
+            let still: Taps = Prefilter::new(width, sigma).taps(0.0);
+            let moving = Prefilter::new(width, sigma);
+            assert!((still.iter().sum::<f64>() - 1.0).abs() < 1e-6);
             for k in [0.0, 0.02, 0.05, 0.1, 0.2, 0.3] {
-                let filter = cosines(k).iter().zip(taps).map(|(cosine, tap)| cosine * tap).sum::<f64>();
-                let gaussian = (-2.0 * (PI * k * sigma).powi(2)).exp();
-                let off = (filter * bump(width, k)[0] - 1.0).abs() * gaussian;
-                assert!(off < most, "width {width}, sigma {sigma}, k {k}: {off:e}");
+                let bump = bump(width, k)[0];
+                let what = format!("width {width}, sigma {sigma}, k {k}");
+                assert!(off(&still, [0.0, k, bump, sigma]) < most, "{what}");
+                for shift in [-0.5, -0.31, 0.0, 0.07, 0.4] {
+                    let taps: MovingTaps = moving.taps(shift);
+                    assert!(off(&taps, [shift, k, bump, sigma]) < most, "{what}, {shift}");
+                    assert!((taps.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+                }
             }
         }
     }

@@ -44,6 +44,23 @@ impl Shear {
         Self { axes, slopes, depths: [b[2], c[2], a[2]], pixels, origin, fineness }
     }
 
+    /// The same lattice with b and c exchanged if steps along c are longer across the picture, so that few columns of
+    /// cells lie around a pixel.
+    pub(super) fn widened(self) -> Self {
+        let ([b, c, a], [alpha, beta], [zb, zc, za], [along, across]) =
+            (self.axes, self.slopes, self.depths, self.pixels);
+        if across[0].abs() <= along[0].abs() {
+            return self;
+        }
+        Self { axes: [c, b, a], slopes: [beta, alpha], depths: [zc, zb, za], pixels: [across, along], ..self }
+    }
+
+    /// Cells along u by which a row of cells moves for columns to be upright, per row (eq 46).
+    pub(super) fn lean(&self) -> f64 {
+        let [b, c] = self.pixels;
+        if c[0].abs() > UPRIGHT * c[1].abs() { -c[0] / b[0] } else { 0.0 }
+    }
+
     /// The position of a voxel in cells (eq 35).
     pub(in crate::render) fn position(&self, voxel: [usize; 3]) -> [f64; 2] {
         let [b, c, a] = self.axes.map(|axis| voxel[axis] as f64);
@@ -70,6 +87,9 @@ impl Shear {
     }
 }
 
+/// A column of cells counts as upright if it leans by less than this share: far less than a pixel over any volume.
+const UPRIGHT: f64 = 1e-9;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,7 +103,9 @@ mod tests {
             let camera = Camera::new(&view, &grid).expect("a valid view");
             for fineness in [1, 2] {
                 let shear = Shear::new(&camera, &grid, fineness);
-                for voxel in grid.whole().iter() {
+                for (shear, voxel) in
+                    [shear, shear.widened()].into_iter().flat_map(|s| grid.whole().iter().map(move |v| (s, v)))
+                {
                     let [x, y, z] = camera.project(grid.position(voxel));
                     let pixel = shear.pixel(shear.position(voxel));
                     let off = [pixel[0] - x, pixel[1] - y, shear.depth(voxel) - z];

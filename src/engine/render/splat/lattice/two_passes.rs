@@ -1,10 +1,10 @@
-//! Gathers pixels in two passes, if the kernel is a product (eq 38): the columns of cells are summed for a row of pixels,
-//! then these sums along the row.
+//! Gathers pixels in two passes (eq 38): the upright columns of cells are summed for a row of pixels, then these sums along
+//! the row.
 
 use super::bundle::{Bundle, Bundles, weighted};
 use super::cells::TOGETHER;
 use super::filtered::Window;
-use super::product::Product;
+use super::upright::Upright;
 use crate::render::splat::tile_rect::TileRect;
 use std::ops::Range;
 use wavesplat_core::base::vectors::dispatch;
@@ -13,10 +13,11 @@ use wavesplat_core::codec::real::Real;
 /// The sums of a tile's columns in one row of pixels, and the weights of all pixels along it.
 #[derive(Debug)]
 pub(super) struct TwoPasses<'a> {
-    product: &'a Product,
+    upright: &'a Upright,
     x: Range<usize>,
-    tile: Window,
-    /// For each pixel of a row: the first column with a weight, and the weights.
+    /// The columns with a weight at any pixel of a row, in order.
+    columns: Vec<isize>,
+    /// For each pixel of a row: the index of the first column with a weight, and the weights.
     first: Vec<usize>,
     weights: Vec<f32>,
     /// The row of pixels that is summed.
@@ -29,26 +30,29 @@ pub(super) struct TwoPasses<'a> {
 }
 
 impl<'a> TwoPasses<'a> {
-    pub(super) fn new(product: &'a Product, rect: &TileRect, tile: &Window, bundles: &Bundles<'_>) -> Self {
-        let (x, cells) = (rect.x.clone(), product.along.padded());
-        let mut weights = vec![0.0; x.len() * cells];
-        let pixels = x.clone().zip(weights.chunks_exact_mut(cells));
+    pub(super) fn new(upright: &'a Upright, rect: &TileRect, tile: &Window, bundles: &Bundles<'_>) -> Self {
+        let (x, padded) = (rect.x.clone(), upright.along.padded());
+        let mut weights = vec![0.0; x.len() * padded];
+        let pixels = x.clone().zip(weights.chunks_exact_mut(padded));
         let first = pixels.map(|(x, weights)| {
-            let u = product.u[0] + (x as f64 + 0.5) * product.u[1];
-            (product.along.weights(u, weights) - tile.first[0]) as usize
+            let u = upright.u[0] + (x as f64 + 0.5) * upright.u[1];
+            (upright.along.weights(u, weights) - tile.first[0]) as usize
         });
-        let (first, width) = (first.collect(), tile.size[0]);
+        let mut first: Vec<usize> = first.collect();
+        let used = used(&mut first, upright.along.cells, tile.size[0]);
+        let columns: Vec<isize> = used.into_iter().map(|n| tile.first[0] + n as isize).collect();
+        let count = columns.len();
         Self {
-            product,
+            upright,
             x,
-            tile: *tile,
             first,
             weights,
             row: None,
-            single: bundles.single.iter().map(|bundle| vec![0.0; width * bundle.places]).collect(),
-            double: bundles.double.iter().map(|bundle| vec![0.0; width * bundle.places]).collect(),
-            top: vec![0; width],
-            across: vec![0.0; width * product.across.padded()],
+            single: bundles.single.iter().map(|bundle| vec![0.0; count * bundle.places]).collect(),
+            double: bundles.double.iter().map(|bundle| vec![0.0; count * bundle.places]).collect(),
+            top: vec![0; count],
+            across: vec![0.0; count * upright.across.padded()],
+            columns,
         }
     }
 
@@ -58,12 +62,11 @@ impl<'a> TwoPasses<'a> {
             return;
         }
         self.row = Some(y);
-        let Product { across, v: [origin, per_row, per_column], .. } = self.product;
+        let Upright { across, v: [origin, per_row, per_column], .. } = self.upright;
         let crossing = origin + (y as f64 + 0.5) * per_row;
-        let columns = (self.tile.first[0]..).zip(&mut self.top).zip(self.across.chunks_exact_mut(across.padded()));
-        columns.for_each(|((u, top), weights)| *top = across.weights(crossing + u as f64 * per_column, weights));
-        let first = self.tile.first[0];
-        let columns = Columns { first, top: &self.top, weights: &self.across, cells: across.cells };
+        let columns = self.columns.iter().zip(&mut self.top).zip(self.across.chunks_exact_mut(across.padded()));
+        columns.for_each(|((u, top), weights)| *top = across.weights(crossing + *u as f64 * per_column, weights));
+        let columns = Columns { u: &self.columns, top: &self.top, weights: &self.across, cells: across.cells };
         let single = self.single.iter_mut().zip(&bundles.single);
         single.for_each(|(sums, bundle)| sum_columns(bundle, &columns, sums));
         let double = self.double.iter_mut().zip(&bundles.double);
@@ -81,11 +84,22 @@ impl<'a> TwoPasses<'a> {
     }
 
     fn sum_pixels<R: Real>(&self, columns: &[R], x: usize, sums: &mut [[R; TOGETHER]]) {
-        let (n, along, places) = (x - self.x.start, &self.product.along, columns.len() / self.tile.size[0]);
+        let (n, along, places) = (x - self.x.start, &self.upright.along, columns.len() / self.columns.len());
         let first = &self.first[n..][..sums.len()];
         let weights = &self.weights[n * along.padded()..][..sums.len() * along.padded()];
         add_pixels(columns, places, &PixelColumns { first, weights, cells: along.cells }, sums);
     }
+}
+
+/// The columns out of `all` that pixels use, each `count` of them from its `first` one on, which becomes an index into them.
+fn used(first: &mut [usize], count: usize, all: usize) -> Vec<usize> {
+    let mut is_used = vec![false; all];
+    first.iter().for_each(|first| is_used[*first..][..count].fill(true));
+    let used: Vec<usize> = (0..all).filter(|n| is_used[*n]).collect();
+    let mut index = vec![0; all];
+    used.iter().enumerate().for_each(|(i, n)| index[*n] = i);
+    first.iter_mut().for_each(|first| *first = index[*first]);
+    used
 }
 
 fn sum_columns<R: Real>(bundle: &Bundle<'_, R>, columns: &Columns<'_>, sums: &mut [R]) {
@@ -100,8 +114,8 @@ fn sum_columns<R: Real>(bundle: &Bundle<'_, R>, columns: &Columns<'_>, sums: &mu
 
 /// Columns of cells to sum.
 struct Columns<'a> {
-    /// The number of the first one.
-    first: isize,
+    /// Their numbers.
+    u: &'a [isize],
     /// The first row with a weight in each column, and the padded weights.
     top: &'a [isize],
     weights: &'a [f32],
@@ -114,9 +128,9 @@ fn add_columns<R: Real, const N: usize>(bundle: &Bundle<'_, R>, columns: &Column
     let ([width, height], first) = (bundle.window.size, bundle.window.first);
     let (cells, taps) = (bundle.cells.as_chunks::<N>().0, columns.cells as isize);
     let of_columns = columns.top.iter().zip(columns.weights.chunks_exact(columns.weights.len() / columns.top.len()));
-    for (n, (sums, (top, weights))) in sums.as_chunks_mut::<N>().0.iter_mut().zip(of_columns).enumerate() {
+    for ((sums, u), (top, weights)) in sums.as_chunks_mut::<N>().0.iter_mut().zip(columns.u).zip(of_columns) {
         *sums = [R::default(); N];
-        let (u, v) = (columns.first + n as isize - first[0], top - first[1]);
+        let (u, v) = (u - first[0], top - first[1]);
         let start = (-v).clamp(0, taps);
         let end = (height as isize - v).clamp(start, taps);
         if (0..width as isize).contains(&u) && start < end {
