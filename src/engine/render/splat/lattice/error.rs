@@ -19,8 +19,8 @@
 //! ```
 //!
 //! At a fixed u, w is a Gaussian along v with the conditional deviation. So [`Axis::new`] sums the first part along one
-//! axis, for all positions of pixel and slice between cells. The second part is the error along u, a Gaussian's shape
-//! along v, times at most the blur of A_v. If rows move, A_u differs from row to row: its error is the largest for any
+//! axis, for all positions of pixel and slice between cells. The second part is at most the error along u times the blur of
+//! A_v, for the error has a Gaussian's shape along v. If rows move, A_u differs from row to row: its error is the largest for any
 //! move. If not, u and v may change places; and on a principal axis w is a product, and A_v changes nothing but an error
 //! of second order.
 //!
@@ -30,7 +30,7 @@
 use super::Spreading;
 use super::fit::{AxisFit, Spread};
 use super::kernel::Kernel;
-use super::prefilter::MovingPrefilter;
+use super::prefilter::{HALF, Taps};
 
 /// Upper bounds for an infinite slice of voxels, as shares of its largest sum of weights.
 #[derive(Debug, Clone, Copy)]
@@ -56,16 +56,16 @@ impl SliceError {
 
     fn at_positions(weighting: &Weighting<'_>, spreading: &Spreading, step: usize) -> Self {
         let Weighting { kernel, cut, roundings } = *weighting;
-        let Spreading { shear, fits: [along, across], moving, .. } = spreading;
+        let Spreading { shear, fits: [along, across], .. } = spreading;
+        let moves = shear.lean() != 0.0;
         let (marginal, conditional) = (kernel.sigmas(), kernel.conditional_sigmas());
-        let row = |fit, moving| Row { fineness: shear.fineness, fit, moving, step };
-        let u = Axis::new(&row(along, moving.as_ref()), [conditional[0], marginal[0]]);
-        let v = Axis::new(&row(across, None), [conditional[1], marginal[1]]);
+        let row = |fit, moves| Row { fineness: shear.fineness, fit, moves, step };
+        let u = Axis::new(&row(along, moves), [conditional[0], marginal[0]]);
+        let v = Axis::new(&row(across, false), [conditional[1], marginal[1]]);
         let across_first = |[eu, ev]: [f64; 2]| ev + eu * v.blur;
         // Rows that do not move are filtered in either order.
         let either = |[eu, ev]: [f64; 2]| (eu + ev * u.blur).min(product(kernel, [eu, ev]));
-        let both =
-            |errors| if moving.is_some() { across_first(errors) } else { across_first(errors).min(either(errors)) };
+        let both = |errors| if moves { across_first(errors) } else { across_first(errors).min(either(errors)) };
         let cut = cut * u.amplified * v.amplified;
         let rounding = ROUNDING * roundings as f64 * u.blur * v.blur;
         let bound = |errors| both(errors) + cut + rounding;
@@ -137,8 +137,8 @@ const FAR: f64 = 8.0;
 struct Row<'a> {
     fineness: usize,
     fit: &'a AxisFit,
-    /// The filter that moves the row of cells, by any share of a cell.
-    moving: Option<&'a MovingPrefilter>,
+    /// Whether the row of cells moves, by any share of a cell.
+    moves: bool,
     /// Every so many positions are tried.
     step: usize,
 }
@@ -148,13 +148,12 @@ impl Axis {
     fn new(row: &Row<'_>, [conditional, marginal]: [f64; 2]) -> Self {
         let (mut most, mut largest) = (Self::default(), [0.0_f64; 2]);
         let tables = [conditional, marginal].map(Table::new);
-        let half = if row.moving.is_some() { PHASES as isize / 2 } else { 0 };
+        let half = if row.moves { PHASES as isize / 2 } else { 0 };
         for by in (-half..=half).step_by(row.step) {
-            let moved = row.moving.map(|moving| moving.taps(by as f64 / PHASES as f64));
-            let taps = moved.as_ref().map_or(&row.fit.taps[..], |taps| taps);
+            let taps = row.fit.moved(by as f64 / PHASES as f64);
             // Mirrored positions have the same sums.
             for voxel in (0..=PHASES / 2).step_by(row.step) {
-                let (first, cells) = filtered(&row.fit.at(voxel as f64 / PHASES as f64), row.fit.width, taps);
+                let (first, cells) = filtered(&row.fit.at(voxel as f64 / PHASES as f64), row.fit.width, &taps);
                 most.add(
                     &VoxelRow { voxel, by, fineness: row.fineness, first, cells: &cells },
                     row.step,
@@ -180,12 +179,17 @@ impl Axis {
             let RowSums { sum, of_ones, of_wave, exact, .. } = row.sums(pixel, &tables[0]);
             let RowSums { blurred, exact: of_marginal, .. } = row.sums(pixel, &tables[1]);
             *largest = [largest[0].max(exact), largest[1].max(of_marginal)];
-            self.sum = self.sum.max(sum);
-            self.of_ones = self.of_ones.max(of_ones.abs());
-            self.of_waves = self.of_waves.max(of_wave[0].hypot(of_wave[1]));
-            self.blur = self.blur.max(blurred);
+            self.sum = larger(self.sum, sum);
+            self.of_ones = larger(self.of_ones, of_ones.abs());
+            self.of_waves = larger(self.of_waves, of_wave[0].hypot(of_wave[1]));
+            self.blur = larger(self.blur, blurred);
         }
     }
+}
+
+/// The larger number; infinity for a filter without numbers.
+fn larger(most: f64, number: f64) -> f64 {
+    if number.is_nan() { f64::INFINITY } else { most.max(number) }
 }
 
 /// A Gaussian at multiples of 1 / [`PHASES`] cells.
@@ -261,18 +265,17 @@ impl VoxelRow<'_> {
 }
 
 /// The filtered cells of a voxel that is spread to `width` cells: the first one that it reaches, and its weights.
-fn filtered(spread: &Spread, width: usize, taps: &[f64]) -> (isize, Vec<f64>) {
-    let mut out = vec![0.0; width + taps.len() - 1];
+fn filtered(spread: &Spread, width: usize, taps: &Taps) -> (isize, Vec<f64>) {
+    let mut out = vec![0.0; width + 2 * HALF];
     for (n, weight) in spread.weights[..width].iter().enumerate() {
         taps.iter().rev().enumerate().for_each(|(j, tap)| out[n + j] += weight * tap);
     }
-    (spread.first - (taps.len() / 2) as isize, out)
+    (spread.first - HALF as isize, out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::axis::Cut;
-    use super::super::prefilter::MovingTaps;
     use super::super::shear::Shear;
     use super::super::upright::{Move, Upright};
     use super::super::{Choice, Sums};
@@ -298,7 +301,7 @@ mod tests {
         upright: Upright,
         spreading: Spreading,
         /// For each row of cells from -[`ROWS`] on, how far it moves, and its filter.
-        rows: Vec<(isize, Vec<f64>)>,
+        rows: Vec<(isize, Taps)>,
     }
 
     const ROWS: isize = 80;
@@ -316,8 +319,7 @@ mod tests {
             let spreading = Spreading::new(shear, choice, kernel.conditional_sigmas(), 0.0, 20);
             let of_row = |v: isize| {
                 let Move { cells, rest } = upright.moved(v);
-                let moved: Option<MovingTaps> = spreading.moving.as_ref().map(|moving| moving.taps(rest));
-                (cells, moved.map_or(spreading.fits[0].taps.to_vec(), |taps| taps.to_vec()))
+                (cells, spreading.fits[0].moved(rest))
             };
             let rows = (-ROWS..=ROWS).map(of_row).collect();
             Self { kernel, upright, spreading, rows }
@@ -424,7 +426,7 @@ mod tests {
                     let what =
                         format!("{fineness} {width} at {azimuth}, {roll}, {sigma}: {off:e} {signed:e}, {stated:?}");
                     assert!(off <= stated.sum && signed <= stated.of_ones, "{what}");
-                    let tight = if splatted.spreading.moving.is_some() { 0.2 } else { 0.25 };
+                    let tight = if splatted.spreading.shear.lean() != 0.0 { 0.2 } else { 0.25 };
                     assert!(off > tight * stated.sum || stated.sum < 1e-3, "{what}");
                 }
             }

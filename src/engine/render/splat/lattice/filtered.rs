@@ -2,7 +2,7 @@
 
 use super::Sums;
 use super::cells::{Aligned, Cells, LINE, PlaneSums, Rectangle, TOGETHER};
-use super::prefilter::{HALF, MOVING_HALF, MovingTaps, Taps};
+use super::prefilter::{HALF, TAPS, Taps};
 use rayon::prelude::*;
 use std::ops::Range;
 use wavesplat_core::base::vectors::dispatch;
@@ -46,24 +46,7 @@ pub(super) struct Filters {
 pub(super) struct Along {
     /// The column before the filter that becomes the first one after it.
     pub(super) start: isize,
-    pub(super) taps: AlongTaps,
-}
-
-/// The taps of a row that does not move, or of one that does.
-#[derive(Debug)]
-pub(super) enum AlongTaps {
-    Still(Taps),
-    Moving(MovingTaps),
-}
-
-impl AlongTaps {
-    /// Cells to each side of a filtered cell.
-    fn half(&self) -> usize {
-        match self {
-            Self::Still(_) => HALF,
-            Self::Moving(_) => MOVING_HALF,
-        }
-    }
+    pub(super) taps: Taps,
 }
 
 /// Planes side by side, cell by cell.
@@ -125,7 +108,14 @@ impl Window {
         Self { first: [0, 1].map(|i| first[i] - more[i] as isize), size: [0, 1].map(|i| size[i] + 2 * more[i]) }
     }
 
-    /// The part of this rectangle that lies in another one.
+    /// The smallest rectangle that holds both.
+    pub(super) fn joined(&self, other: &Self) -> Self {
+        let end = |window: &Self, i: usize| window.first[i] + window.size[i] as isize;
+        let first = [0, 1].map(|i| self.first[i].min(other.first[i]));
+        Self { first, size: [0, 1].map(|i| (end(self, i).max(end(other, i)) - first[i]) as usize) }
+    }
+
+    /// The cells of this rectangle in another one.
     pub(super) fn within(&self, other: &Self) -> Self {
         let first = [0, 1].map(|i| self.first[i].max(other.first[i]));
         let end = |window: &Self, i: usize| window.first[i] + window.size[i] as isize;
@@ -227,8 +217,8 @@ impl<'a, R: Real> Rows<'a, R> {
 
     /// The columns with sums in row v after both filters.
     fn columns(&self, v: usize, filters: &Filters) -> Range<usize> {
-        let (near, phases, Along { start, taps }) = (self.near(v), self.rectangle.phases, &filters.along[v]);
-        let (half, width) = (taps.half() as isize, filters.window.size[0] as isize);
+        let (near, phases, start) = (self.near(v), self.rectangle.phases, filters.along[v].start);
+        let (half, width) = (HALF as isize, filters.window.size[0] as isize);
         let within = |column: usize, more: isize| (column as isize + more - start).clamp(0, width) as usize;
         if near.is_empty() { 0..0 } else { within(near.start * phases, -half)..within(near.end * phases, half) }
     }
@@ -246,40 +236,39 @@ impl<'a, R: Real> Rows<'a, R> {
         }
         let (near, Along { start, taps }) = (self.near(v), &filters.along[v]);
         // Before and after the sums, as many zeros as the filter reaches twice, and those of a last line.
-        let (half, width) = (taps.half(), near.len() * self.rectangle.phases);
-        let RowScratch { phase, row, out } = scratch;
+        let width = near.len() * self.rectangle.phases;
+        let RowScratch { zeros, phase, row, out } = scratch;
         row.clear();
-        row.resize(width + 4 * half + LINE, R::default());
-        self.filter_across(v, &near, &filters.across, phase, &mut row[2 * half..][..width]);
-        let first = near.start * self.rectangle.phases;
-        let from = &row[(columns.start as isize + start + half as isize) as usize - first..];
-        out.resize(columns.len().next_multiple_of(LINE), R::default());
-        match taps {
-            AlongTaps::Still(taps) => dispatch!(filter_along(from, &taps.map(R::from_f64), &mut out[..])),
-            AlongTaps::Moving(taps) => dispatch!(filter_along(from, &taps.map(R::from_f64), &mut out[..])),
+        row.resize(width + 4 * HALF + LINE, R::default());
+        zeros.resize(near.len(), R::default());
+        phase.resize(near.len(), R::default());
+        for n in 0..self.rectangle.phases {
+            self.filter_across(v, n, &near, &filters.across, zeros, phase);
+            let to = row[2 * HALF + n..].iter_mut().step_by(self.rectangle.phases);
+            to.zip(&*phase).for_each(|(to, from)| *to = *from);
         }
+        let first = near.start * self.rectangle.phases;
+        let from = &row[(columns.start as isize + start + HALF as isize) as usize - first..];
+        out.resize(columns.len().next_multiple_of(LINE), R::default());
+        dispatch!(filter_along(from, &taps.map(R::from_f64), &mut out[..]));
         &out[..columns.len()]
     }
 
-    /// Filters row v along v, and puts the cells `near` of all phases side by side.
-    fn filter_across(&self, v: usize, near: &Range<usize>, taps: &Taps, phase: &mut Vec<R>, out: &mut [R]) {
-        let Rectangle { size: [width, _], phases, run, .. } = *self.rectangle;
-        let (taps, zeros) = (taps.map(R::from_f64), vec![R::default(); near.len()]);
-        phase.resize(near.len(), R::default());
-        for n in 0..phases {
-            let row = |j: usize| {
-                let v = (v + j).checked_sub(HALF).filter(|v| *v < self.spans.len());
-                v.map_or(&zeros[..], |v| &self.sums[v * width + n * run..][near.clone()])
-            };
-            dispatch!(sum_of_products(std::array::from_fn(row), &taps, &mut phase[..]));
-            out[n..].iter_mut().step_by(phases).zip(&*phase).for_each(|(to, from)| *to = *from);
-        }
+    /// Filters the cells `near` of one phase of a row along v. Rows outside are `zeros`.
+    fn filter_across(&self, v: usize, phase: usize, near: &Range<usize>, taps: &Taps, zeros: &[R], out: &mut [R]) {
+        let Rectangle { size: [width, _], run, .. } = *self.rectangle;
+        let row = |j: usize| {
+            let v = (v + j).checked_sub(HALF).filter(|v| *v < self.spans.len());
+            v.map_or(zeros, |v| &self.sums[v * width + phase * run..][near.clone()])
+        };
+        dispatch!(sum_of_products(std::array::from_fn(row), &taps.map(R::from_f64), out));
     }
 }
 
-/// Scratch for a row: a phase and all phases after the filter along v, and the row after both filters.
+/// Scratch for a row: zeros, a phase and all phases after the filter along v, and the row after both filters.
 #[derive(Default)]
 struct RowScratch<R> {
+    zeros: Vec<R>,
     phase: Vec<R>,
     row: Vec<R>,
     out: Vec<R>,
@@ -304,20 +293,20 @@ fn span<R: Real>(numbers: &[R]) -> Range<usize> {
     first * LANES..((last + 1) * LANES).min(numbers.len())
 }
 
-/// Filters a row, from half of the taps before the first filtered one on.
+/// Filters a row, from [`HALF`] cells before the first filtered one on.
 #[inline(always)]
-fn filter_along<R: Real, const N: usize>(row: &[R], taps: &[R; N], to: &mut [R]) {
+fn filter_along<R: Real>(row: &[R], taps: &[R; TAPS], to: &mut [R]) {
     let width = to.len();
     sum_of_products(std::array::from_fn(|n| &row[n..][..width]), taps, to);
 }
 
 /// out = sum over j of f_j x_j, a line at a time                                                            (eq 36)
 #[inline(always)]
-fn sum_of_products<R: Real, const N: usize>(rows: [&[R]; N], taps: &[R; N], to: &mut [R]) {
-    let rows: [&[[R; LINE]]; N] = rows.map(|row| row.as_chunks().0);
+fn sum_of_products<R: Real>(rows: [&[R]; TAPS], taps: &[R; TAPS], to: &mut [R]) {
+    let rows: [&[[R; LINE]]; TAPS] = rows.map(|row| row.as_chunks().0);
     for (i, to) in to.as_chunks_mut::<LINE>().0.iter_mut().enumerate() {
         let mut sums = [R::default(); LINE];
-        for j in 0..N {
+        for j in 0..TAPS {
             let numbers = &rows[j][i];
             for l in 0..LINE {
                 sums[l] = sums[l] + taps[j] * numbers[l];

@@ -12,7 +12,7 @@
 //! This is the projection of the Gaussian onto the shifts of g. The condition keeps constants exact. The products of
 //! Gaussians have integrals in closed form, so weights take a few equations per position.
 
-use super::prefilter::{HALF, Prefilter, Taps, solve};
+use super::prefilter::{HALF, Prefilter, TAPS, Taps, solve};
 
 /// The largest number of cells that a voxel is spread to along an axis.
 pub(super) const MOST_WIDTH: usize = 6;
@@ -34,7 +34,8 @@ pub(super) struct Spread {
 pub(super) struct AxisFit {
     /// Cells that a voxel is spread to.
     pub(super) width: usize,
-    /// The prefilter.
+    /// The prefilters, and the taps of the one that moves nothing.
+    pub(super) prefilter: Prefilter,
     pub(super) taps: Taps,
     /// Standard deviation of the Gaussian in cells.
     sigma: f64,
@@ -47,7 +48,8 @@ pub(super) struct AxisFit {
 impl AxisFit {
     /// Spreading to `width` cells, for a Gaussian with a standard deviation of `sigma` cells.
     pub(super) fn new(width: usize, sigma: f64) -> Self {
-        let taps = Prefilter::new(width, sigma).taps(0.0);
+        let prefilter = Prefilter::new(width, sigma);
+        let taps = symmetric(prefilter.taps(0.0));
         let of_pair = |d: f64| both(|j| both(|l| tap(&taps, j) * tap(&taps, l) * overlap(d + (j - l) as f64, sigma)));
         let by_distance: Vec<f64> = (0..width).map(|d| of_pair(d as f64)).collect();
         let product = |c: usize, d: usize| {
@@ -55,12 +57,17 @@ impl AxisFit {
         };
         let products = std::array::from_fn(|c| std::array::from_fn(|d| product(c, d)));
         let ones = std::array::from_fn(|c| if c < width { 1.0 } else { 0.0 });
-        Self { width, taps, sigma, products, level: solve(products, ones) }
+        Self { width, prefilter, taps, sigma, products, level: solve(products, ones) }
     }
 
     /// The first cell that a voxel at `position` is spread to.
     pub(super) fn first(&self, position: f64) -> isize {
         (position - self.width as f64 / 2.0).floor() as isize + 1
+    }
+
+    /// The taps that move cells by `rest`.
+    pub(super) fn moved(&self, rest: f64) -> Taps {
+        if rest == 0.0 { self.taps } else { self.prefilter.taps(rest) }
     }
 
     /// The cells and the weights for a voxel at `position` (eq 45).
@@ -77,6 +84,12 @@ impl AxisFit {
         weights.iter_mut().zip(self.level).for_each(|(weight, level)| *weight += missing * level);
         Spread { first, weights }
     }
+}
+
+/// Taps that are the same on both sides, without the rounding of their equations, as f32 holds them. The weights that are fitted to
+/// them make up for this rounding.
+fn symmetric(taps: Taps) -> Taps {
+    std::array::from_fn(|j| f64::from((0.5 * (taps[j] + taps[TAPS - 1 - j])) as f32))
 }
 
 /// The tap of the cell j cells away.

@@ -1,4 +1,4 @@
-//! Gathers the pixels of a tile from its filtered cells: sums of cells times the kernel of eq 37.
+//! Gathers the pixels of a tile from its filtered cells: sums of cells times the kernel, in two passes (eq 38).
 
 use super::bundle::{Bundles, TilePlane};
 use super::cells::TOGETHER;

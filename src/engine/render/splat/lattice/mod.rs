@@ -45,7 +45,6 @@ pub(in crate::render) use shear::Shear;
 pub(super) use spread::{Placed, SpreadScratch};
 
 use fit::{AxisFit, Spread};
-use prefilter::{MovingPrefilter, Prefilter};
 use std::sync::OnceLock;
 
 /// A way to spread voxels.
@@ -90,8 +89,6 @@ struct Spreading {
     sums: Sums,
     /// The weights and prefilters along u and v.
     fits: [AxisFit; 2],
-    /// The prefilters along u if rows of cells move (eq 46).
-    moving: Option<MovingPrefilter>,
     tau: f64,
     /// Slices of the grid.
     slices: usize,
@@ -103,8 +100,7 @@ impl Spreading {
     /// Spreads voxels for a Gaussian with these standard deviations in cells. The grid has `slices` slices.
     fn new(shear: Shear, choice: Choice, sigmas: [f64; 2], tau: f64, slices: usize) -> Self {
         let fits = sigmas.map(|sigma| AxisFit::new(choice.width, sigma));
-        let moving = (shear.lean() != 0.0).then(|| Prefilter::new(choice.width, sigmas[0]));
-        Self { shear, sums: choice.sums, fits, moving, tau, slices, spreads: OnceLock::new() }
+        Self { shear, sums: choice.sums, fits, tau, slices, spreads: OnceLock::new() }
     }
 
     /// Cells that a voxel is spread to along an axis.

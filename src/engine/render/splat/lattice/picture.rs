@@ -4,10 +4,10 @@
 use super::axis::Cut;
 use super::cells::{Cells, LINE, Rectangle};
 use super::error::{SliceError, Weighting};
-use super::filtered::{Along, AlongTaps, FilteredCells, Filters, Window, places, side_by_side};
+use super::filtered::{Along, FilteredCells, Filters, Window, places, side_by_side};
 use super::fit::MOST_WIDTH;
 use super::kernel::Kernel;
-use super::prefilter::{HALF, MOVING_HALF};
+use super::prefilter::HALF;
 use super::shear::Shear;
 use super::upright::{Move, Upright};
 use super::{Choice, Placed, Spreading, Sums};
@@ -173,7 +173,8 @@ impl Lattice {
     fn is_tame(&self) -> bool {
         let shear = &self.spreading.shear;
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
-        let positions = [self.before([0.0; 2]), self.upright.position([0.0; 2]), self.upright.half_before()];
+        let positions =
+            [shear.cells([shear.origin[0], shear.origin[1]]), self.upright.position([0.0; 2]), self.upright.half()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
         within(&shear.slopes, STEEPEST_SLOPE)
             && per_pixel.iter().all(|n| within(n, 1e6))
@@ -221,28 +222,34 @@ impl Lattice {
 
     /// The same, with the cells that the prefilter reaches.
     fn filtered_rectangle(&self, region: &Region) -> Window {
-        self.rectangle(region).grown(self.filter_half())
-    }
-
-    /// Cells to each side, along u and v, that a filtered cell is a sum of, and one more for moves.
-    fn filter_half(&self) -> [usize; 2] {
-        [if self.spreading.moving.is_some() { MOVING_HALF + 1 } else { HALF }, HALF]
+        self.rectangle(region).grown([HALF + 1, HALF])
     }
 
     /// The upright cells of the centres of a rectangle of pixels.
     pub(super) fn cells_reached(&self, x: &Range<usize>, y: &Range<usize>) -> Window {
-        around(x, y, self.upright.half(), |pixel| self.upright.position(pixel))
+        let [x, y] = [x, y].map(|pixels| [pixels.start as f64 + 0.5, pixels.end as f64 - 0.5]);
+        let corners = x.into_iter().flat_map(|x| y.map(move |y| [x, y]));
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for position in corners.map(|pixel| self.upright.position(pixel)) {
+            (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
+        }
+        let half = self.upright.half();
+        let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
+        Window { first, size: [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize) }
     }
 
-    /// The cells before rows move of the centres of a rectangle of pixels, and those that the prefilter reaches.
+    /// The cells, before rows move, that the filtered cells of a band's tiles are sums of. Tiles at the corners reach
+    /// farthest.
     fn cells_before(&self, x: &Range<usize>, y: &Range<usize>) -> Window {
-        around(x, y, self.upright.half_before(), |pixel| self.before(pixel)).grown(self.filter_half())
-    }
-
-    /// Converts a position in pixels to cells before rows move.
-    fn before(&self, pixel: [f64; 2]) -> [f64; 2] {
-        let shear = &self.spreading.shear;
-        shear.cells([0, 1].map(|i| pixel[i] - shear.origin[i]))
+        let [width, height] = self.tile();
+        let ends = |pixels: &Range<usize>, side: usize| {
+            let last = pixels.start + (pixels.len().saturating_sub(1)) / side * side;
+            [pixels.start, last].map(|start| start..start + side)
+        };
+        let rows = ends(y, height);
+        let corners = ends(x, width).into_iter().flat_map(|x| rows.each_ref().map(|y| self.cells_reached(&x, y)));
+        let before = corners.map(|tile| self.upright.before(&tile));
+        before.reduce(|all, tile| all.joined(&tile)).unwrap_or_default().grown([HALF + 1, HALF])
     }
 
     /// The columns and rows of the picture that a block can reach. Both are empty if either is.
@@ -275,15 +282,12 @@ impl Lattice {
 
     /// The filtered cells of a band.
     pub(in crate::render) fn filter(&self, cells: Cells, band: &TileRect) -> FilteredCells {
-        let (rectangle, spreading) = (cells.rectangle(), &self.spreading);
-        let [along, across] = &spreading.fits;
+        let (rectangle, [along, across]) = (cells.rectangle(), &self.spreading.fits);
         let Window { first: [u, _], size: [width, _] } =
             self.cells_reached(&band.x, &band.y).within(&self.upright_bounds);
         let of_row = |v: isize| {
             let Move { cells, rest } = self.upright.moved(v);
-            let still = || AlongTaps::Still(along.taps);
-            let taps = spreading.moving.as_ref().map_or_else(still, |moving| AlongTaps::Moving(moving.taps(rest)));
-            Along { start: u + cells - rectangle.first[0], taps }
+            Along { start: u + cells - rectangle.first[0], taps: along.moved(rest) }
         };
         let rows = rectangle.first[1]..rectangle.first[1] + rectangle.size[1] as isize;
         let window = Window { first: [u, rows.start], size: [width, rectangle.size[1]] };
@@ -337,8 +341,8 @@ impl Lattice {
     /// An upper bound of the cells of a plane of a band, before and after rows move.
     fn band_cells(&self, [width, height]: [usize; 2]) -> usize {
         let (x, y) = (0..width, 0..height);
-        // Two more cells cover rounding and any position of the band.
-        let most = |reached: Window, bounds: &Window| [0, 1].map(|i| (reached.size[i] + 2).min(bounds.size[i]));
+        // Four more cells cover rounding and any position of the band.
+        let most = |reached: Window, bounds: &Window| [0, 1].map(|i| (reached.size[i] + 4).min(bounds.size[i]));
         let before = most(self.cells_before(&x, &y), &self.bounds);
         let [columns, _] = most(self.cells_reached(&x, &y), &self.upright_bounds);
         self.held(before).max((columns + 1) * before[1])
@@ -354,18 +358,6 @@ impl Lattice {
     fn held(&self, size: [usize; 2]) -> usize {
         (size[0] + 3 * self.spreading.shear.fineness * LINE) * size[1]
     }
-}
-
-/// The cells within `half` cells of the centres of a rectangle of pixels, whose positions in cells `position` gives.
-fn around(x: &Range<usize>, y: &Range<usize>, half: [f64; 2], position: impl Fn([f64; 2]) -> [f64; 2]) -> Window {
-    let [x, y] = [x, y].map(|pixels| [pixels.start as f64 + 0.5, pixels.end as f64 - 0.5]);
-    let corners = x.into_iter().flat_map(|x| y.map(move |y| [x, y]));
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for position in corners.map(position) {
-        (0..2).for_each(|i| (low[i], high[i]) = (low[i].min(position[i]), high[i].max(position[i])));
-    }
-    let first = [0, 1].map(|i| (low[i] - half[i]).floor() as isize - 1);
-    Window { first, size: [0, 1].map(|i| ((high[i] + half[i]).ceil() as isize + 2 - first[i]) as usize) }
 }
 
 /// The choice for a quick look, and the cut of its kernel in standard deviations.

@@ -67,16 +67,21 @@ impl Upright {
         self.shear.cells([0, 1].map(|i| pixel[i] - self.shear.origin[i]))
     }
 
-    /// The cells of a window of the lattice before rows moved.
+    /// The cells of a window of the lattice before rows move.
     pub(super) fn window(&self, before: &Window) -> Window {
-        let Window { first: [u, v], size: [width, height] } = *before;
-        if self.lean == 0.0 {
-            return *before;
-        }
-        let moved = [v, v + height as isize - 1].map(|v| self.moved(v).cells);
-        let first = u - moved[0].max(moved[1]);
-        let end = u + width as isize - moved[0].min(moved[1]);
-        Window { first: [first, v], size: [(end - first) as usize, height] }
+        self.moved_window(before, -1)
+    }
+
+    /// The cells before rows move of a window of this lattice.
+    pub(super) fn before(&self, window: &Window) -> Window {
+        self.moved_window(window, 1)
+    }
+
+    /// The smallest window that holds the rows of another one, moved by whole cells to one side (1) or the other (-1).
+    fn moved_window(&self, window: &Window, side: isize) -> Window {
+        let Window { first: [u, v], size: [width, height] } = *window;
+        let [first, last] = [v, v + height as isize - 1].map(|v| side * self.moved(v).cells);
+        Window { first: [u + first.min(last), v], size: [width + first.abs_diff(last), height] }
     }
 
     /// The largest share of the kernel's sum over all cells that its weights leave out or get wrong.
@@ -94,12 +99,6 @@ impl Upright {
     pub(super) fn half(&self) -> [f64; 2] {
         let [along, across] = [&self.along, &self.across].map(|axis| (axis.cells / 2) as f64);
         [along, across + along * self.v[2].abs()]
-    }
-
-    /// The same on the lattice before rows moved.
-    pub(super) fn half_before(&self) -> [f64; 2] {
-        let [u, v] = self.half();
-        [u + v * self.lean.abs(), v]
     }
 
     /// The largest distance in pixels, along x or y, from a pixel to any cell with a weight.
