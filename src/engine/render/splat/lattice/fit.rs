@@ -86,8 +86,7 @@ impl AxisFit {
     }
 }
 
-/// Taps that are the same on both sides, without the rounding of their equations, as f32 holds them. The weights that are fitted to
-/// them make up for this rounding.
+/// Taps that are the same on both sides, as f32 holds them. The weights that are fitted to them make up for the rounding.
 fn symmetric(taps: Taps) -> Taps {
     std::array::from_fn(|j| f64::from((0.5 * (taps[j] + taps[TAPS - 1 - j])) as f32))
 }

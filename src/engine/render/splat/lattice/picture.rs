@@ -190,7 +190,7 @@ impl Lattice {
         let copied = area(self.tile_cells(tile)) as f64 * pixels / area(tile) as f64;
         let tiles = camera.size[0].div_ceil(tile[0]) * camera.size[1].div_ceil(tile[1]);
         TILING * tiles as f64
-            + GATHERING * self.upright.products() * pixels
+            + GATHERING * self.upright.cells() * pixels
             + COPYING * copied
             + SPREADING * clip.voxels() as f64 * width * (q + 1.0)
     }
@@ -375,7 +375,7 @@ const OF_A_WEIGHT: usize = 8;
 const FOOTPRINT: f64 = 20.0;
 /// The cost of a tile, with or without voxels, in the same unit.
 const TILING: f64 = 2000.0;
-/// The measured costs of a product from cells to pixels (weights included), of copying a cell into a tile, and of a
+/// The measured costs of a cell around a pixel (of all cells within the cut), of copying a cell into a tile, and of a
 /// product from voxels to cells, in units of a product of a footprint.
 const GATHERING: f64 = 0.5;
 const COPYING: f64 = 5.0;

@@ -89,10 +89,9 @@ impl Upright {
         self.along.cut + self.across.cut
     }
 
-    /// Products for a pixel and a plane: of the columns that it adds to those of its neighbour, and along the row.
-    pub(super) fn products(&self) -> f64 {
-        let columns = self.u[1].abs().min(self.along.cells as f64);
-        columns * self.across.cells as f64 + self.along.cells as f64
+    /// Cells within the cut around a pixel, nearly: an ellipse of them.
+    pub(super) fn cells(&self) -> f64 {
+        std::f64::consts::FRAC_PI_4 * (self.along.cells * self.across.cells) as f64
     }
 
     /// An upper bound of the distance from a pixel to any cell with a weight, along u and v.
