@@ -165,8 +165,8 @@ impl SlicedView {
     }
 
     /// The position of a picture's point on the lattice, in voxels.
-    pub(super) fn cell_at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        self.shear.cells([x - self.shear.origin[0], y - self.shear.origin[1]])
+    pub(super) fn cell_at(&self, point: [f64; 2]) -> [f64; 2] {
+        self.shear.cell_at(point)
     }
 
     /// The position of a point of the picture in cells of the lattice, counted from its first cell.

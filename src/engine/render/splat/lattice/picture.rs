@@ -24,8 +24,6 @@ pub(in crate::render) struct Lattice {
     spreading: Arc<Spreading>,
     kernel: Kernel,
     pub(super) upright: Upright,
-    /// Reach of the footprint in pixels: farther cells do not influence a pixel.
-    reach: f64,
     /// f at its centre.
     pub(super) peak: f64,
     /// The largest number of additions for a cell of a plane.
@@ -138,10 +136,10 @@ impl Lattice {
         let (kernel, upright) = (Kernel::new(&shear, sigma), Upright::new(&shear, sigma, cut)?);
         let slices = grid.dims[shear.axes[2]];
         let spreading = Spreading::new(shear, choice, kernel.conditional_sigmas(), view.kernel.tau, slices);
-        let (reach, peak, bounds) = (upright.reach(), footprint.at_depth(0.0), Window::default());
+        let (peak, bounds) = (footprint.at_depth(0.0), Window::default());
         let additions = additions(clip, blocks, shear.axes[2]);
         let spreading = Arc::new(spreading);
-        let mut lattice = Self { spreading, kernel, upright, reach, peak, additions, bounds, upright_bounds: bounds };
+        let mut lattice = Self { spreading, kernel, upright, peak, additions, bounds, upright_bounds: bounds };
         if !lattice.suits() || lattice.work(camera, clip) > view.footprint_work() {
             return None;
         }
@@ -173,8 +171,7 @@ impl Lattice {
     fn is_tame(&self) -> bool {
         let shear = &self.spreading.shear;
         let per_pixel = [[1.0, 0.0], [0.0, 1.0]].map(|pixel| shear.cells(pixel));
-        let positions =
-            [shear.cells([shear.origin[0], shear.origin[1]]), self.upright.position([0.0; 2]), self.upright.half()];
+        let positions = [shear.cell_at([0.0; 2]), self.upright.position([0.0; 2]), self.upright.half()];
         let within = |numbers: &[f64; 2], most: f64| numbers.iter().all(|n| n.abs() <= most);
         within(&shear.slopes, STEEPEST_SLOPE)
             && per_pixel.iter().all(|n| within(n, 1e6))
@@ -256,7 +253,7 @@ impl Lattice {
     pub(in crate::render) fn pixels_reached(&self, region: &Region, size: [usize; 2]) -> [Range<usize>; 2] {
         let Window { first, size: cells } = self.filtered_rectangle(region);
         let corner = |n: isize| [0, 1].map(|i| (first[i] + (n >> i & 1) * cells[i] as isize) as f64);
-        pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.reach, size)
+        pixels_around((0..4).map(|n| self.spreading.shear.pixel(corner(n))), self.upright.reach(), size)
     }
 
     /// Whether a block adds to any cell that the tiles of these pixels read. Tiles take the mean of all cells that they read, also

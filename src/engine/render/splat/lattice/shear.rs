@@ -80,6 +80,11 @@ impl Shear {
         [(x * c[1] - y * c[0]) / det, (b[0] * y - b[1] * x) / det].map(|voxels| voxels * self.fineness as f64)
     }
 
+    /// The position of a point of the picture in cells.
+    pub(in crate::render) fn cell_at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        self.cells([x - self.origin[0], y - self.origin[1]])
+    }
+
     /// Converts a position in cells to pixels.
     pub(in crate::render) fn pixel(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [b, c] = [u, v].map(|cells| cells / self.fineness as f64);

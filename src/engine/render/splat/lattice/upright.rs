@@ -64,7 +64,7 @@ impl Upright {
 
     /// The position of a pixel in cells.
     pub(super) fn position(&self, pixel: [f64; 2]) -> [f64; 2] {
-        self.shear.cells([0, 1].map(|i| pixel[i] - self.shear.origin[i]))
+        self.shear.cell_at(pixel)
     }
 
     /// The cells of a window of the lattice before rows move.
@@ -104,5 +104,65 @@ impl Upright {
     pub(super) fn reach(&self) -> f64 {
         let pixels = |axis: &AxisKernel, step: f64| (axis.cells / 2) as f64 * (step / self.shear.fineness as f64).abs();
         pixels(&self.along, self.shear.pixels[0][0]).max(pixels(&self.across, self.shear.pixels[1][1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wavesplat_core::base::grid::Grid;
+    use wavesplat_core::view::camera::{Camera, View};
+
+    #[test]
+    fn weights_are_the_gaussian_at_every_cell() {
+        let grid = Grid::unit([9, 9, 9]);
+        for (azimuth, elevation, roll, sigma) in
+            [(0.0, 0.0, 7.0, 3.0), (31.0, 40.0, 7.0, 9.0), (45.0, 0.0, 0.0, 3.0), (20.0, 70.0, 120.0, 4.0)]
+        {
+            let view = View { azimuth, elevation, roll, size: [50, 50], scale: Some(4.0), center: None };
+            let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, 2).widened();
+            let upright = Upright::new(&shear, sigma, Cut { radius: 4.5, phases: 256 }).expect("a wide kernel");
+            let (half, reach) = (upright.half(), upright.reach());
+            let (mut along, mut across) = (vec![0.0; upright.along.padded()], vec![0.0; upright.across.padded()]);
+            for [x, y] in [[0.0, 0.0], [-3.5, 12.5], [100.1, -7.77], [0.49, 0.51]] {
+                let ([u, v], mut held) = (upright.position([x, y]), 0.0);
+                let first = upright.along.weights(upright.u[0] + x * upright.u[1], &mut along);
+                for (column, of_column) in (first..).zip(&along[..upright.along.cells]) {
+                    let crossing = upright.v[0] + y * upright.v[1] + column as f64 * upright.v[2];
+                    let top = upright.across.weights(crossing, &mut across);
+                    for (row, of_row) in (top..).zip(&across[..upright.across.cells]) {
+                        let [right, down] = upright.shear.pixel([column as f64, row as f64]);
+                        let [right, down] = [right - x, down - y];
+                        let expected = (-(right * right + down * down) / (2.0 * sigma * sigma)).exp();
+                        assert!((f64::from(of_column * of_row) - expected).abs() < 4e-6, "{expected}");
+                        let off = [(column as f64 - u).abs(), (row as f64 - v).abs()];
+                        assert!((0..2).all(|i| off[i] <= half[i] + 1e-9) && right.abs() <= reach + 1e-9);
+                        held += expected;
+                    }
+                }
+                let every = (-60..=60)
+                    .flat_map(|i| (-60..=60).map(move |j| [u.round() + f64::from(i), v.round() + f64::from(j)]));
+                let weight = |cell: [f64; 2]| {
+                    let [right, down] = upright.shear.pixel(cell);
+                    (-((right - x).powi(2) + (down - y).powi(2)) / (2.0 * sigma * sigma)).exp()
+                };
+                let all: f64 = every.map(weight).sum();
+                assert!((all - held) / all <= upright.cut(), "{azimuth}: {held} of {all}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_row_moves_by_its_whole_cells_and_a_rest() {
+        let grid = Grid::unit([9, 9, 9]);
+        let view = View { azimuth: 20.0, elevation: 70.0, roll: 33.0, size: [50, 50], scale: Some(4.0), center: None };
+        let shear = Shear::new(&Camera::new(&view, &grid).expect("a valid view"), &grid, 2).widened();
+        let upright = Upright::new(&shear, 3.0, Cut { radius: 4.5, phases: 256 }).expect("a kernel");
+        for cell in [[0, 0], [5, -7], [-30, 41]] {
+            let Move { cells, rest } = upright.moved(cell[1]);
+            let [u, v] = cell.map(|n| n as f64);
+            let (here, before) = (upright.shear.pixel([u, v]), shear.pixel([u + cells as f64 + rest, v]));
+            assert!((0..2).all(|i| (here[i] - before[i]).abs() < 1e-9) && rest.abs() <= 0.5, "{cell:?}");
+        }
     }
 }
