@@ -11,7 +11,6 @@ use super::field::{Above, Field, Plane, Stored};
 use super::rows::Change;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
-use std::collections::HashMap;
 use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
@@ -203,25 +202,21 @@ impl Block {
             samples().for_each(|at| kept.extend_from_slice(&exact[at * size..][..size]));
             *exact = kept;
         }
-        let stored = |positions: &mut dyn Iterator<Item = usize>, bytes: &[u8]| -> HashMap<usize, Vec<u8>> {
-            positions.zip(bytes.chunks_exact(size).map(<[u8]>::to_vec)).collect()
-        };
+        let number = |at: usize| Some(at / all * decoded.len() + decoded.binary_search(&(at % all)).ok()?);
         let Outliers { positions, samples: bytes } = std::mem::take(&mut self.outliers);
-        let outliers = stored(&mut positions.iter().map(|at| *at as usize), &bytes);
-        let (mask, bytes) = std::mem::take(&mut self.missing);
-        let missing = stored(&mut (0..mask.len()).filter(|at| mask[*at]), &bytes);
-        for (number, at) in samples().enumerate() {
-            if let Some(bytes) = outliers.get(&at) {
+        for (at, bytes) in positions.iter().zip(bytes.chunks_exact(size)) {
+            if let Some(number) = number(*at as usize) {
                 self.outliers.positions.push(number as u32);
                 self.outliers.samples.extend(bytes);
             }
-            if !mask.is_empty() {
-                self.missing.0.push(mask[at]);
-                self.missing.1.extend(missing.get(&at).into_iter().flatten());
-            }
         }
-        if !self.missing.0.contains(&true) {
-            self.missing.0.clear();
+        let (mask, bytes) = std::mem::take(&mut self.missing);
+        let mut is_decoded = vec![false; all];
+        decoded.iter().for_each(|voxel| is_decoded[*voxel] = true);
+        let missing = (0..mask.len()).filter(|at| mask[*at]).zip(bytes.chunks_exact(size));
+        self.missing.1 = missing.filter(|(at, _)| is_decoded[at % all]).flat_map(|(_, bytes)| bytes).copied().collect();
+        if !self.missing.1.is_empty() {
+            self.missing.0 = samples().map(|at| mask[at]).collect();
         }
     }
 

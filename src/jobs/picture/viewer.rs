@@ -188,7 +188,7 @@ impl ViewerSession {
         let config = render_config(&request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, memory)?;
         let samples = match frame {
             Some(frame) => distribution_of_frames(scene.as_mut(), &config, &[frame], &caller)?,
-            None => distribution(scene.as_mut(), &config, &caller)?,
+            None => distribution(scene.as_mut(), &config, None, &caller)?,
         };
         Ok(samples
             .as_ref()

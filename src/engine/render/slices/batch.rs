@@ -3,10 +3,10 @@
 use super::layer::Layers;
 use super::needed::{Known, Need};
 use super::probe::Probe;
-use super::row::Blend;
+use super::row::{Blend, LastMeans};
 use super::stops::Stops;
 use super::sweep::{Band, SweepScratch};
-use super::view::{Slice, SlicedView};
+use super::view::{Slab, SlicedView};
 use super::{GROUP, finish};
 use crate::render::batches::{BlockSamples, SampleReader, Units};
 use crate::render::report::{RenderReport, lap};
@@ -32,12 +32,20 @@ struct Frame<B: Blend> {
     layers: Layers,
     groups: Vec<B::Group>,
     limits: Vec<f32>,
+    /// The last means; none if every slab is one slice.
+    last: Vec<LastMeans>,
 }
 
 impl<B: Blend> Frame<B> {
     fn new(view: &SlicedView, most: usize, units: Units) -> Self {
         let groups = groups(view);
-        Self { units, layers: Layers::new(view, most), groups: vec![B::EMPTY; groups], limits: vec![B::OPEN; groups] }
+        Self {
+            units,
+            layers: Layers::new(view, most),
+            groups: vec![B::EMPTY; groups],
+            limits: vec![B::OPEN; groups],
+            last: vec![LastMeans::NONE; if view.has_parts() { groups } else { 0 }],
+        }
     }
 }
 
@@ -59,10 +67,11 @@ pub(in crate::render) fn bytes<B: Blend>(
     is_shaded: bool,
 ) -> usize {
     let layers = Layers::bytes(view, most_layers(view, blocks));
-    let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>());
+    let last = if view.has_parts() { size_of::<LastMeans>() } else { 0 };
+    let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>() + last);
     let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
     let sweep = rayon::current_num_threads() * SweepScratch::bytes(view, rows_of_band(view), is_shaded);
-    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLICES * Slice::bytes(view)
+    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLABS * Slab::bytes(view)
 }
 
 /// Rows of each band.
@@ -89,18 +98,18 @@ impl<B: Blend> SlicePass<'_, B> {
             lap(&mut clock, &mut report.decode_seconds);
             let ready = self.view.ready(next, met);
             next = ready.end;
-            for first in ready.clone().step_by(SLICES) {
-                let numbers = first..ready.end.min(first + SLICES);
-                let slices: Vec<Slice> = numbers.filter_map(|number| self.view.slice(number)).collect();
-                frames.par_iter_mut().for_each(|frame| self.add(&slices, frame));
+            for first in ready.clone().step_by(SLABS) {
+                let numbers = first..ready.end.min(first + SLABS);
+                let slabs: Vec<Slab> = numbers.filter_map(|number| self.view.slab(number)).collect();
+                frames.par_iter_mut().for_each(|frame| self.add(&slabs, frame));
             }
             if let (Some(probe), Some(frame)) = (&mut probe, frames.first()) {
                 probe.add(self.blend, &frame.units, &frame.layers, met);
             }
             lap(&mut clock, &mut report.splat_seconds);
-            progress.advance((ready.len() * units.len()) as u64);
+            progress.advance((ready.len() * self.view.parts() * units.len()) as u64);
         }
-        progress.advance(((self.view.slices() - next) * units.len()) as u64);
+        progress.advance(((self.view.all_slabs() - next) * self.view.parts() * units.len()) as u64);
         let mut clock = Instant::now();
         let pictures = self.finish(&frames);
         report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
@@ -189,18 +198,21 @@ impl<B: Blend> SlicePass<'_, B> {
         Ok(())
     }
 
-    /// Adds slices to all cells of a frame, in bands of rows.
-    fn add(&self, slices: &[Slice], frame: &mut Frame<B>) {
+    /// Adds slabs to all cells of a frame, in bands of rows.
+    fn add(&self, slabs: &[Slab], frame: &mut Frame<B>) {
         let view = self.view;
         let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
-        let chunks = frame.groups.par_chunks_mut(rows * of_row).zip(frame.limits.par_chunks_mut(rows * of_row));
-        chunks.enumerate().for_each(|(n, (groups, limits))| {
+        let size = rows * of_row;
+        let mut last: Vec<&mut [LastMeans]> = frame.last.chunks_mut(size).collect();
+        last.resize_with(frame.groups.len().div_ceil(size), Default::default);
+        let chunks = frame.groups.par_chunks_mut(size).zip(frame.limits.par_chunks_mut(size));
+        chunks.zip(last).enumerate().for_each(|(n, ((groups, limits), last))| {
             let scratch = SweepScratch::new(view, rows, self.blend.is_shaded());
             let rows = n * rows..((n + 1) * rows).min(view.extent[1]);
-            let first = n * rows_of_band(view) * of_row;
+            let first = n * size;
             let stops = self.stops.map_or(&[][..], |stops| stops.groups(first..first + groups.len()));
-            let mut band = Band { view, blend: self.blend, rows, groups, limits, stops, scratch };
-            slices.iter().for_each(|slice| band.add(slice, &frame.layers));
+            let mut band = Band { view, blend: self.blend, rows, groups, limits, last, stops, scratch };
+            slabs.iter().for_each(|slab| band.add(slab, &frame.layers));
         });
     }
 
@@ -213,8 +225,8 @@ impl<B: Blend> SlicePass<'_, B> {
     }
 }
 
-/// Slices that are weighed at a time.
-const SLICES: usize = 32;
+/// Slabs that are weighed at a time.
+const SLABS: usize = 32;
 
 /// The least rows of a band: the rows at its edges are filtered for both bands.
 const LEAST_ROWS: usize = 32;

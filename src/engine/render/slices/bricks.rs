@@ -55,22 +55,6 @@ impl Ranges {
         })
     }
 
-    /// The ranges of every row of bricks together with the `reach` rows before and behind it.
-    pub(super) fn dilated(&self, reach: usize) -> Self {
-        let rows = self.least.len() / self.columns.max(1);
-        let mut wide = Self::inverted(self.columns, self.least.len());
-        for row in 0..rows {
-            for other in row.saturating_sub(reach)..(row + reach + 1).min(rows) {
-                for column in 0..self.columns {
-                    let (to, from) = (row * self.columns + column, other * self.columns + column);
-                    wide.least[to] = wide.least[to].min(self.least[from]);
-                    wide.largest[to] = wide.largest[to].max(self.largest[from]);
-                }
-            }
-        }
-        wide
-    }
-
     /// The joint range of some columns of some rows.
     pub(super) fn joined(&self, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>) -> (f32, f32) {
         let mut range = (f32::INFINITY, f32::NEG_INFINITY);
@@ -102,8 +86,6 @@ mod tests {
             assert_eq!(found.least[brick], values().fold(f32::INFINITY, f32::min));
             assert_eq!(found.largest[brick], values().fold(f32::NEG_INFINITY, f32::max));
         }
-        let wide = found.dilated(1);
-        assert_eq!(wide.joined(0..1, 0..2), found.joined(0..2, 0..2));
         assert!(!dispatch!(ranges(&vec![1.0; stride * rows][..], (stride, columns))).1);
     }
 }

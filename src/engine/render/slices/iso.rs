@@ -5,7 +5,7 @@
 use super::GROUP;
 use super::blend::{off_light, pixel_of_light};
 use super::cover::{CoverPoint, Rays, Slope};
-use super::row::{Blend, Point, Row};
+use super::row::{Blend, Point, Row, RowGroups};
 use super::shade::Shader;
 use super::view::SlicedView;
 use crate::render::batches::Units;
@@ -92,8 +92,8 @@ impl Blend for Isosurfaces {
         self.values.iter().any(|value| range.0 <= *value && *value <= range.1)
     }
 
-    fn add(&self, row: &Row<'_>, groups: &mut [Front], limits: &mut [f32]) {
-        for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate().filter(|(n, _)| row.live[*n]) {
+    fn add(&self, row: &Row<'_>, RowGroups { states, limits, live, .. }: RowGroups<'_, Front>) {
+        for (n, (group, limit)) in states.iter_mut().zip(limits).enumerate().filter(|(n, _)| live[*n]) {
             let next = dispatch!(slope(row, n));
             let follows = group.slice.wrapping_add(1) == row.slice;
             let marked = if follows { self.rays.near(&self.values, &group.last, &next) } else { [false; GROUP] };

@@ -3,7 +3,7 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
-use super::row::{Blend, Point, Row};
+use super::row::{Blend, Point, Row, RowGroups};
 use crate::render::batches::Units;
 use wavesplat_core::base::vectors::dispatch;
 
@@ -56,8 +56,8 @@ impl Blend for Largest {
         false
     }
 
-    fn add(&self, row: &Row<'_>, groups: &mut [Peaks], limits: &mut [f32]) {
-        dispatch!(add(row, groups, limits));
+    fn add(&self, row: &Row<'_>, groups: RowGroups<'_, Peaks>) {
+        dispatch!(add(row, groups.live, groups.states, groups.limits));
     }
 
     fn cells(group: &Peaks) -> Sixteen {
@@ -113,9 +113,9 @@ fn nearest(inner: [f32; 4], across: [f32; 4], down: [f32; 4]) -> f32 {
 }
 
 #[inline(always)]
-fn add(row: &Row<'_>, groups: &mut [Peaks], limits: &mut [f32]) {
+fn add(row: &Row<'_>, live: &[bool], groups: &mut [Peaks], limits: &mut [f32]) {
     for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate() {
-        if !row.live[n] {
+        if !live[n] {
             continue;
         }
         let values = if row.is_whole(n) {

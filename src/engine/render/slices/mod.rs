@@ -27,12 +27,16 @@
 //! ```text
 //! blocks, a layer at a time       samples in table units           needed: blocks that may be visible
 //!   voxel layers of a frame       layer, bricks                    front to back, a few at a time
+//!     slab                        view, sweep                      as one slice where light hardly changes, else its slices
 //!     slice: sums along a         filter                           6 layers with the default kernel
 //!       phases: sums along b      filter                           whole rows
 //!         rows: sums along c      filter, row                      16 cells at a time
 //!           blend                 blend, iso, mip, table, shade    light and transmittance, or the largest
 //! cells to pixels                 finish                           4 x 4 cells
 //! ```
+//!
+//! With sharp opacities, the part of the rays within a voxel is a slab of several slices. Where the values of a group of
+//! cells hardly change from slab to slab, one slice of the slab's thickness takes their place.
 //!
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.

@@ -31,10 +31,11 @@ pub(in crate::render) struct Row<'a> {
     pub(super) density: f32,
     /// Where the density is less, there is nothing.
     pub(super) least: f32,
-    /// For each group, whether it is computed, and whether all its weights meet the region.
-    pub(super) live: &'a [bool],
+    /// For each group, whether all its weights meet the region.
     pub(super) whole: &'a [bool],
+    /// The number of the slice, and the number of slices in whose place it stands.
     pub(super) slice: u32,
+    pub(super) thickness: u32,
     /// The place of the first cell in voxels along b, c and a. Voxels along a are counted along the ray. The cells of a
     /// row are a voxel apart along b.
     pub(super) place: [f32; 3],
@@ -75,7 +76,7 @@ impl Row<'_> {
             lengths[i] = if is_there { length } else { 0.0 };
         }
         if let Some(stops) = self.stops.get(group) {
-            let shares = stops::shares(stops, self.slice);
+            let shares = stops::shares(stops, self.slice, self.thickness);
             for i in 0..GROUP {
                 lengths[i] *= shares[i];
             }
@@ -162,6 +163,29 @@ pub(in crate::render) struct Point {
     pub(super) gradient: [f64; 3],
 }
 
+/// The groups of a row of cells.
+pub(in crate::render) struct RowGroups<'a, G> {
+    pub(super) states: &'a mut [G],
+    pub(super) limits: &'a mut [f32],
+    /// Whether each is to be computed.
+    pub(super) live: &'a mut [bool],
+    /// The last means; none if every slab is one slice.
+    pub(super) last: &'a mut [LastMeans],
+}
+
+/// The means of a group in the middle of a slab.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LastMeans {
+    pub(super) means: Sixteen,
+    /// The number of the first slice after the slab.
+    pub(super) next: u32,
+}
+
+impl LastMeans {
+    /// No slab.
+    pub(super) const NONE: Self = Self { means: [0.0; GROUP], next: u32::MAX };
+}
+
 /// Rays with less transmittance are opaque: the rest is a thirtieth of a level of an 8-bit picture.
 pub(super) const CLOSED: f32 = 1.0 / 8192.0;
 
@@ -212,8 +236,9 @@ pub(in crate::render) trait Blend: Sync {
         limit < CLOSED
     }
 
-    /// Adds the live groups of a row behind the slices before, and updates their limits.
-    fn add(&self, row: &Row<'_>, groups: &mut [Self::Group], limits: &mut [f32]);
+    /// Adds the live groups of a row behind the slices before, and updates their limits. If the row stands in place of
+    /// several slices, adds only groups whose light hardly changes within them: these are then no longer live.
+    fn add(&self, row: &Row<'_>, groups: RowGroups<'_, Self::Group>);
 
     /// The cells of a group.
     fn cells(group: &Self::Group) -> [Self::Cell; GROUP];

@@ -40,17 +40,17 @@ impl Stops {
     }
 }
 
-/// The shares of slice `number` before these stops.
+/// The shares, before these stops, of `thickness` slices from `number` on.
 #[inline(always)]
-pub(super) fn shares(stops: &Sixteen, number: u32) -> Sixteen {
+pub(super) fn shares(stops: &Sixteen, number: u32, thickness: u32) -> Sixteen {
     let mut shares = [0.0; GROUP];
     for i in 0..GROUP {
-        shares[i] = (stops[i] - number as f32).clamp(0.0, 1.0);
+        shares[i] = ((stops[i] - number as f32) / thickness as f32).clamp(0.0, 1.0);
     }
     shares
 }
 
-/// Whether all rays of a group end before the slice after `number`.
-pub(super) fn are_over(stops: &Sixteen, number: u32) -> bool {
-    stops.iter().all(|stop| *stop <= (number + 1) as f32)
+/// Whether all rays of a group end before slice `next`.
+pub(super) fn are_over(stops: &Sixteen, next: u32) -> bool {
+    stops.iter().all(|stop| *stop <= next as f32)
 }

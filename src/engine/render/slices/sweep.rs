@@ -3,10 +3,10 @@
 use super::bricks::Ranges;
 use super::filter::{AxisSums, Sixteen, Strip, mix, mix_present};
 use super::layer::Layers;
-use super::row::{Blend, Row, RowSums};
+use super::row::{Blend, LastMeans, Row, RowGroups, RowSums};
 use super::stops::are_over;
 use super::taps::Taps;
-use super::view::{Slice, SlicedView};
+use super::view::{Slab, Slice, SlicedView};
 use super::{BRICK_ROWS, GROUP, LEAST};
 use std::ops::Range;
 use wavesplat_core::base::vectors::dispatch;
@@ -20,6 +20,8 @@ pub(super) struct Band<'a, B: Blend> {
     /// Groups of cells and their limits: row by row, phase by phase.
     pub(super) groups: &'a mut [B::Group],
     pub(super) limits: &'a mut [f32],
+    /// The last means of these groups; none if every slab is one slice.
+    pub(super) last: &'a mut [LastMeans],
     /// The stops of these groups; none if no ray ends early.
     pub(super) stops: &'a [Sixteen],
     pub(super) scratch: SweepScratch,
@@ -33,16 +35,30 @@ pub(super) struct SweepScratch {
     along_a: Vec<AxisSums>,
     /// AxisSums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
     along_b: Vec<Vec<AxisSums>>,
+    /// For each group of the band, whether it is to be computed.
+    live: Vec<bool>,
+    /// The bricks whose sums along a these need, and for each phase and row of bricks the groups whose sums along a and b they
+    /// need.
+    needed_along_a: Vec<bool>,
+    needed_along_b: Vec<Vec<bool>>,
 }
 
 impl SweepScratch {
     /// For a band of `rows` rows.
     pub(super) fn new(view: &SlicedView, rows: usize, is_shaded: bool) -> Self {
-        let (rim, rows) = (2 * view.reach[0] + GROUP, Self::rows(view, rows));
+        let (rim, band, rows) = (2 * view.reach[0] + GROUP, rows, Self::rows(view, rows));
         let [of_a, of_b] = Self::kinds(is_shaded);
         let along_a = (0..of_a).map(|_| AxisSums::zeros(rows * Self::width(view, rim))).collect();
         let phase = |_| (0..of_b).map(|_| AxisSums::zeros(rows * view.extent[0])).collect();
-        Self { rim, along_a, along_b: (0..view.cells).map(phase).collect() }
+        let (bricks, groups) = (rows.div_ceil(BRICK_ROWS), view.extent[0] / GROUP);
+        Self {
+            rim,
+            along_a,
+            along_b: (0..view.cells).map(phase).collect(),
+            live: vec![false; band * view.cells * view.cells * groups],
+            needed_along_a: vec![false; bricks * view.count[0].div_ceil(GROUP)],
+            needed_along_b: vec![vec![false; bricks * groups]; view.cells],
+        }
     }
 
     /// The kinds of sums along a, and along a and b.
@@ -52,7 +68,8 @@ impl SweepScratch {
 
     /// The most rows of voxels, in whole bricks, that a band of `rows` rows needs.
     fn rows(view: &SlicedView, rows: usize) -> usize {
-        (rows + 2 * view.reach[1] + 1 + 2 * BRICK_ROWS).min(view.count[1].next_multiple_of(BRICK_ROWS))
+        let reached = rows + 2 * (view.reach[1] + view.margin) + 1;
+        (reached + 2 * BRICK_ROWS).min(view.count[1]).next_multiple_of(BRICK_ROWS)
     }
 
     fn width(view: &SlicedView, rim: usize) -> usize {
@@ -63,11 +80,40 @@ impl SweepScratch {
     pub(super) fn bytes(view: &SlicedView, rows: usize, is_shaded: bool) -> usize {
         let [of_a, of_b] = Self::kinds(is_shaded);
         let row = of_a * Self::width(view, 2 * view.reach[0] + GROUP) + of_b * view.cells * view.extent[0];
-        2 * size_of::<f32>() * Self::rows(view, rows) * row
+        let live = rows * view.cells * view.cells * view.extent[0] / GROUP;
+        2 * size_of::<f32>() * Self::rows(view, rows) * row + live
     }
 }
 
-/// The part of a slice that a band needs.
+/// What a slab needs in a band.
+struct Near {
+    /// The rows of bricks. Sums begin with the first of them.
+    bricks: Range<usize>,
+    /// The ranges of bricks in all layers that the kernel meets.
+    ranges: Ranges,
+}
+
+impl Near {
+    fn new(view: &SlicedView, band: &Range<usize>, slice: &Slice, layers: &Layers) -> Self {
+        let (first, met) = slice.along.within(0, view.count[2]);
+        let near = first.saturating_sub(view.margin)..(first + met.len() + view.margin).min(view.count[2]);
+        let columns = layers.stride / GROUP;
+        let ranges = Ranges::joint(near.map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
+        let firsts = slice.across[1].iter().map(|taps| taps.first);
+        let (least, most) = (firsts.clone().min().unwrap_or(0), firsts.max().unwrap_or(0));
+        let reached = [band.start as i64, (band.end + 2 * view.reach[1]) as i64];
+        let rows = [least + reached[0] - view.margin as i64, most + reached[1] + view.margin as i64];
+        let rows = rows.map(|row| row.clamp(0, layers.rows as i64) as usize);
+        Self { bricks: rows[0] / BRICK_ROWS..rows[1].div_ceil(BRICK_ROWS), ranges }
+    }
+
+    /// The first row of voxels of the sums.
+    fn start(&self) -> usize {
+        self.bricks.start * BRICK_ROWS
+    }
+}
+
+/// A slice where it meets voxels.
 struct Part<'a> {
     slice: &'a Slice,
     /// The layers that the kernel meets, with their weights.
@@ -78,44 +124,13 @@ struct Part<'a> {
     share: f32,
     share_slope: f32,
     has_missing: bool,
-    /// The rows of bricks that the band needs. AxisSums begin with the first of them.
-    bricks: Range<usize>,
-    /// The ranges of bricks, and of bricks with the rows of bricks that the kernel reaches.
-    ranges: Ranges,
-    wide: Ranges,
 }
 
-impl Part<'_> {
-    /// The first row of voxels of the sums.
-    fn start(&self) -> usize {
-        self.bricks.start * BRICK_ROWS
-    }
-}
-
-impl<B: Blend> Band<'_, B> {
-    /// Adds a slice behind the earlier ones.
-    pub(super) fn add(&mut self, slice: &Slice, layers: &Layers) {
-        let part = self.part(slice, layers);
-        if self.blend.shows(part.ranges.joined(part.bricks.clone(), 0..part.ranges.columns)) {
-            self.along_a(&part, layers);
-            (0..self.view.cells).for_each(|phase| self.along_b(&part, phase));
-            self.along_c(&part);
-        }
-    }
-
-    fn part<'s>(&self, slice: &'s Slice, layers: &'s Layers) -> Part<'s> {
-        let view = self.view;
+impl<'a> Part<'a> {
+    fn new(view: &SlicedView, slice: &'a Slice, layers: &'a Layers) -> Self {
         let (first, met) = slice.along.within(0, view.count[2]);
         let numbers = first..first + met.len();
-        let near = first.saturating_sub(view.margin)..(first + met.len() + view.margin).min(view.count[2]);
-        let columns = layers.stride / GROUP;
-        let ranges = Ranges::joint(near.map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
-        let wide = ranges.dilated((2 * (view.reach[1] + view.margin)).div_ceil(BRICK_ROWS));
-        let firsts = slice.across[1].iter().map(|taps| taps.first);
-        let (least, most) = (firsts.clone().min().unwrap_or(0), firsts.max().unwrap_or(0));
-        let rows = [least + self.rows.start as i64, most + (self.rows.end + 2 * view.reach[1]) as i64];
-        let rows = rows.map(|row| row.clamp(0, layers.rows as i64) as usize);
-        Part {
+        Self {
             slice,
             layers: numbers.clone().map(|layer| layers.layer(layer)).collect(),
             weights: &slice.along.weights[met.clone()],
@@ -123,29 +138,111 @@ impl<B: Blend> Band<'_, B> {
             share: slice.along.presence(0, view.count[2]),
             share_slope: slice.along.presence_slope(0, view.count[2]),
             has_missing: numbers.into_iter().any(|layer| layers.is_missing(layer)),
-            bricks: rows[0] / BRICK_ROWS..rows[1].div_ceil(BRICK_ROWS),
-            ranges,
-            wide,
+        }
+    }
+}
+
+impl<B: Blend> Band<'_, B> {
+    /// Adds a slab behind the earlier ones: as one slice the groups whose light hardly changes within it, then the
+    /// others slice by slice.
+    pub(super) fn add(&mut self, slab: &Slab, layers: &Layers) {
+        let near = Near::new(self.view, &self.rows, &slab.middle, layers);
+        let all = near.ranges.joined(near.bricks.clone(), 0..near.ranges.columns);
+        if !self.blend.shows(all) || !self.find_live(&near, &slab.middle) {
+            return;
+        }
+        if slab.is_met {
+            self.add_slice(&slab.middle, &near, layers);
+        }
+        for slice in &slab.slices {
+            let live = self.scratch.live.iter_mut().zip(&*self.limits);
+            live.for_each(|(live, limit)| *live &= !B::is_closed(*limit));
+            self.add_slice(slice, &near, layers);
         }
     }
 
-    /// AxisSums along a, for all bricks that a visible cell may need.
-    fn along_a(&mut self, part: &Part<'_>, layers: &Layers) {
-        let (view, rim) = (self.view, self.scratch.rim);
-        let (columns, stride) = (part.ranges.columns, SweepScratch::width(view, rim));
-        let reach = (GROUP + 2 * view.reach[0]) / GROUP + 1;
+    /// Adds a slice to the live groups.
+    fn add_slice(&mut self, slice: &Slice, near: &Near, layers: &Layers) {
+        let part = Part::new(self.view, slice, layers);
+        if self.find_needed(slice, near) {
+            self.along_a(&part, near, layers);
+            (0..self.view.cells).for_each(|phase| self.along_b(&part, near, phase));
+            self.along_c(&part, near);
+        }
+    }
+
+    /// The groups of a row of cells, of one phase along b.
+    fn groups_at(&self, row: usize, down: usize, phase: usize) -> Range<usize> {
+        let (view, count) = (self.view, self.view.extent[0] / GROUP);
+        let at = (((row - self.rows.start) * view.cells + down) * view.cells + phase) * count;
+        at..at + count
+    }
+
+    /// Marks the groups that are visible in a slab and not hidden. Returns whether there are any.
+    fn find_live(&mut self, near: &Near, middle: &Slice) -> bool {
+        let view = self.view;
+        let (mut visible, mut any) = (vec![Visible::default(); view.cells], false);
+        for row in self.rows.clone() {
+            for (down, taps) in middle.across[1].iter().enumerate() {
+                let bricks = bricks_of(view, taps, row);
+                visible[down].update(view, near, middle, bricks, |range| self.blend.shows(range));
+                for phase in 0..view.cells {
+                    let groups = self.groups_at(row, down, phase);
+                    let (limits, live) = (&self.limits[groups.clone()], &mut self.scratch.live[groups]);
+                    any |= visible[down].live::<B>(phase, limits, live);
+                }
+            }
+        }
+        any
+    }
+
+    /// Marks the bricks and groups of sums that the live groups of a slice need. Returns whether there are any.
+    fn find_needed(&mut self, slice: &Slice, near: &Near) -> bool {
+        let (view, count) = (self.view, self.view.extent[0] / GROUP);
+        self.scratch.needed_along_a.fill(false);
+        self.scratch.needed_along_b.iter_mut().for_each(|needed| needed.fill(false));
+        for row in self.rows.clone() {
+            for (down, taps) in slice.across[1].iter().enumerate() {
+                let (first, met) = taps.within(row as i64, view.count[1]);
+                let bricks = first / BRICK_ROWS..(first + met.len()).div_ceil(BRICK_ROWS);
+                for phase in (0..view.cells).filter(|_| !met.is_empty()) {
+                    let live = &self.scratch.live[self.groups_at(row, down, phase)];
+                    for brick in bricks.clone() {
+                        let needed = &mut self.scratch.needed_along_b[phase];
+                        let needed = &mut needed[(brick - near.bricks.start) * live.len()..];
+                        needed.iter_mut().zip(live).for_each(|(needed, live)| *needed |= *live);
+                    }
+                }
+            }
+        }
+        let (columns, mut any) = (near.ranges.columns, false);
+        for (taps, needed) in slice.across[0].iter().zip(&self.scratch.needed_along_b) {
+            let bricks = self.scratch.needed_along_a.chunks_exact_mut(columns.max(1));
+            for (bricks, needed) in bricks.zip(needed.chunks_exact(count)) {
+                for group in (0..count).filter(|group| needed[*group]) {
+                    bricks[columns_of(view, taps.first, group, 0)].fill(true);
+                    any = true;
+                }
+            }
+        }
+        any
+    }
+
+    /// AxisSums along a, for all bricks that are needed.
+    fn along_a(&mut self, part: &Part<'_>, near: &Near, layers: &Layers) {
+        let (view, rim, columns) = (self.view, self.scratch.rim, near.ranges.columns);
+        let stride = SweepScratch::width(view, rim);
         if part.has_missing {
             self.scratch.along_a.iter_mut().for_each(AxisSums::with_present);
         }
-        for row in part.bricks.clone() {
+        for row in near.bricks.clone() {
             for column in 0..columns {
-                let near = column.saturating_sub(reach)..(column + reach + 1).min(columns);
-                if !self.blend.shows(part.wide.joined(row..row + 1, near)) {
+                if !self.scratch.needed_along_a[(row - near.bricks.start) * columns + column] {
                     continue;
                 }
                 let (first, rows) = rows_of(row, layers.rows);
                 let from = Strip { at: first * layers.stride + column * GROUP, stride: layers.stride };
-                let to = Strip { at: (first - part.start()) * stride + rim + column * GROUP, stride };
+                let to = Strip { at: (first - near.start()) * stride + rim + column * GROUP, stride };
                 for (sums, weights) in self.scratch.along_a.iter_mut().zip([part.weights, part.slopes]) {
                     if part.has_missing {
                         let mask = std::array::from_fn(|i| f32::from(u8::from(column * GROUP + i < view.count[0])));
@@ -158,9 +255,9 @@ impl<B: Blend> Band<'_, B> {
         }
     }
 
-    /// AxisSums along b of one phase, for all groups that a visible cell may need.
-    fn along_b(&mut self, part: &Part<'_>, phase: usize) {
-        let (view, rim) = (self.view, self.scratch.rim);
+    /// AxisSums along b of one phase, for all groups that are needed.
+    fn along_b(&mut self, part: &Part<'_>, near: &Near, phase: usize) {
+        let (view, rim, count) = (self.view, self.scratch.rim, self.view.extent[0] / GROUP);
         let taps = &part.slice.across[0][phase];
         let (from, to) = (SweepScratch::width(view, rim), view.extent[0]);
         let sums = &mut self.scratch.along_b[phase];
@@ -172,15 +269,12 @@ impl<B: Blend> Band<'_, B> {
         let shifted = |sums| shifted(sums, taps.weights.len());
         let sources: Vec<[Vec<&[f32]>; 2]> =
             self.scratch.along_a.iter().map(|sums| [shifted(&sums.values), shifted(&sums.present)]).collect();
-        for group in 0..view.extent[0] / GROUP {
-            let columns = columns_of(view, taps.first, group);
-            let at = rim as i64 + taps.first + (group * GROUP) as i64;
-            for row in part.bricks.clone() {
-                if columns.is_empty() || !self.blend.shows(part.wide.joined(row..row + 1, columns.clone())) {
-                    continue;
-                }
-                let (first, rows) = rows_of(row, view.count[1]);
-                let first = first - part.start();
+        let needed = self.scratch.needed_along_b[phase].chunks_exact(count);
+        for (row, needed) in near.bricks.clone().zip(needed) {
+            let (first, rows) = rows_of(row, view.count[1]);
+            let first = first - near.start();
+            for group in (0..count).filter(|group| needed[*group]) {
+                let at = rim as i64 + taps.first + (group * GROUP) as i64;
                 let strip = Strip { at: first * from + at as usize, stride: from };
                 let out = Strip { at: first * to + group * GROUP, stride: to };
                 for (sums, (source, weights)) in sums.iter_mut().zip(kinds) {
@@ -195,30 +289,27 @@ impl<B: Blend> Band<'_, B> {
     }
 
     /// AxisSums along c, and blends.
-    fn along_c(&mut self, part: &Part<'_>) {
+    fn along_c(&mut self, part: &Part<'_>, near: &Near) {
         let view = self.view;
-        let count = view.extent[0] / GROUP;
         let phases: Vec<Across> = part.slice.across[0].iter().map(|taps| Across::new(view, taps)).collect();
-        let mut visible = vec![Visible::default(); view.cells];
-        let mut live = vec![false; count];
         for row in self.rows.clone() {
             for (down, taps) in part.slice.across[1].iter().enumerate() {
                 let Some(meets) = Down::new(view, part, row, taps) else { continue };
-                visible[down].update(part, meets.bricks(view), |range| self.blend.shows(range), view);
                 for (phase, across) in phases.iter().enumerate() {
-                    if meets.least_density(across) < LEAST {
+                    let groups = self.groups_at(row, down, phase);
+                    let live = &mut self.scratch.live[groups.clone()];
+                    if !live.contains(&true) || meets.least_density(across) < LEAST {
                         continue;
                     }
-                    let at = (((row - self.rows.start) * view.cells + down) * view.cells + phase) * count;
-                    let (groups, limits) = (&mut self.groups[at..at + count], &mut self.limits[at..at + count]);
-                    if visible[down].live::<B>(phase, limits, &mut live) {
-                        let sums = &self.scratch.along_b[phase];
-                        let stops = self.stops.get(at..at + count).unwrap_or_default();
-                        let row = Row { least: B::LEAST, stops, ..meets.row(view, part, sums, across, &live) };
-                        self.blend.add(&row, groups, limits);
-                        let over = limits.iter_mut().zip(stops).filter(|(_, stops)| are_over(stops, row.slice));
-                        over.for_each(|(limit, _)| *limit = B::OVER);
-                    }
+                    let (states, limits) = (&mut self.groups[groups.clone()], &mut self.limits[groups.clone()]);
+                    let stops = self.stops.get(groups.clone()).unwrap_or_default();
+                    let last = self.last.get_mut(groups).unwrap_or_default();
+                    let sums = &self.scratch.along_b[phase];
+                    let row = Row { least: B::LEAST, stops, ..meets.row(view, part, near, sums, across) };
+                    let next = row.slice + row.thickness;
+                    self.blend.add(&row, RowGroups { states, limits: &mut *limits, live, last });
+                    let over = limits.iter_mut().zip(stops).filter(|(_, stops)| are_over(stops, next));
+                    over.for_each(|(limit, _)| *limit = B::OVER);
                 }
             }
         }
@@ -275,16 +366,10 @@ impl<'a> Down<'a> {
             first,
             weights: &taps.weights[met.clone()],
             slopes: &taps.slopes[met],
-            density: part.slice.along.density * taps.density,
+            density: part.slice.along.density * part.slice.filling * taps.density,
             share: part.share * of_row,
             share_slopes: [part.share * slope, part.share_slope * of_row],
         })
-    }
-
-    /// The rows of bricks that decide what is visible.
-    fn bricks(&self, view: &SlicedView) -> Range<usize> {
-        let last = (self.first + self.weights.len() - 1 + view.margin).min(view.count[1] - 1);
-        self.first.saturating_sub(view.margin) / BRICK_ROWS..last / BRICK_ROWS + 1
     }
 
     /// No cell has more density where samples are missing along a and c.
@@ -296,11 +381,11 @@ impl<'a> Down<'a> {
         &'r self,
         view: &SlicedView,
         part: &Part<'_>,
+        near: &Near,
         sums: &'r [AxisSums],
         across: &'r Across,
-        live: &'r [bool],
     ) -> Row<'r> {
-        let from = (self.first - part.start()) * view.extent[0];
+        let from = (self.first - near.start()) * view.extent[0];
         let from_first = |sums: &'r AxisSums| RowSums {
             values: &sums.values[from..],
             present: part.has_missing.then(|| &sums.present[from..]),
@@ -317,9 +402,9 @@ impl<'a> Down<'a> {
             shares_slopes: &across.slopes,
             density: (self.density * across.density) as f32,
             least: LEAST,
-            live,
             whole: &across.whole,
             slice: part.slice.number,
+            thickness: part.slice.thickness,
             place: [across.position, self.position[0], self.position[1]].map(|at| at as f32),
             stops: &[],
         }
@@ -329,23 +414,31 @@ impl<'a> Down<'a> {
 /// The ranges of the groups of a row of cells, for each phase along b; `None` for groups that are not visible.
 #[derive(Debug, Clone, Default)]
 struct Visible {
-    bricks: Range<usize>,
+    /// The rows of bricks that decide.
+    bricks: Option<Range<usize>>,
     ranges: Vec<Vec<Option<(f32, f32)>>>,
 }
 
 impl Visible {
     /// Finds the ranges for rows that need these rows of bricks.
-    fn update(&mut self, part: &Part<'_>, bricks: Range<usize>, shows: impl Fn((f32, f32)) -> bool, view: &SlicedView) {
-        if self.bricks == bricks {
+    fn update(
+        &mut self,
+        view: &SlicedView,
+        near: &Near,
+        middle: &Slice,
+        bricks: Range<usize>,
+        shows: impl Fn((f32, f32)) -> bool,
+    ) {
+        if self.bricks.as_ref() == Some(&bricks) {
             return;
         }
         let range = |first: i64, group: usize| {
-            let columns = columns_of(view, first, group);
-            Some(part.ranges.joined(bricks.clone(), columns)).filter(|range| shows(*range))
+            let columns = columns_of(view, first, group, view.margin);
+            Some(near.ranges.joined(bricks.clone(), columns)).filter(|range| shows(*range))
         };
         let of_phase = |first: i64| (0..view.extent[0] / GROUP).map(|group| range(first, group)).collect();
-        self.ranges = part.slice.across[0].iter().map(|taps| of_phase(taps.first)).collect();
-        self.bricks = bricks;
+        self.ranges = middle.across[0].iter().map(|taps| of_phase(taps.first)).collect();
+        self.bricks = Some(bricks);
     }
 
     /// Marks the groups of a phase that are visible and not hidden. Returns whether there are any.
@@ -364,10 +457,18 @@ fn rows_of(brick: usize, rows: usize) -> (usize, usize) {
     (brick * BRICK_ROWS, BRICK_ROWS.min(rows - brick * BRICK_ROWS))
 }
 
-/// The columns of bricks that the cells of a group need, if the taps of the lattice's first cell start at `first`.
-fn columns_of(view: &SlicedView, first: i64, group: usize) -> Range<usize> {
-    let from = first + (group * GROUP) as i64;
-    let margin = view.margin as i64;
+/// The rows of bricks that decide what is visible in a row of cells.
+fn bricks_of(view: &SlicedView, taps: &Taps, row: usize) -> Range<usize> {
+    let (from, margin) = (taps.first + row as i64, view.margin as i64);
+    let ends = [from - margin, from + taps.weights.len() as i64 + margin];
+    let [from, to] = ends.map(|row| row.clamp(0, view.count[1] as i64) as usize);
+    if from < to { from / BRICK_ROWS..to.div_ceil(BRICK_ROWS) } else { 0..0 }
+}
+
+/// The columns of bricks within `margin` voxels of those that the cells of a group need, if the taps of the lattice's first
+/// cell start at `first`.
+fn columns_of(view: &SlicedView, first: i64, group: usize, margin: usize) -> Range<usize> {
+    let (from, margin) = (first + (group * GROUP) as i64, margin as i64);
     let ends = [from - margin, from + (GROUP + 2 * view.reach[0] - 1) as i64 + margin];
     let [from, to] = ends.map(|column| column.clamp(0, view.count[0] as i64) as usize);
     if from < to { from / GROUP..to.div_ceil(GROUP) } else { 0..0 }

@@ -1,5 +1,5 @@
-//! A transfer function ([Levoy](wavesplat_core::bibliography)) for one distance of slices: colours times opacity, and opacity,
-//! tabulated over the values (eq 30).
+//! A transfer function ([Levoy](wavesplat_core::bibliography)) for one distance of slices, tabulated over the values: colours
+//! times opacity, and opacity (eq 30), for rays of full length; colours and extinction for others.
 
 use crate::render::batches::Units;
 use wavesplat_core::colour::TransferFunction;
@@ -14,6 +14,9 @@ const MOST_OPAQUE: f64 = 1.0 - 1.0 / 512.0;
 /// Shares of a step that count as nothing.
 const NEAR: f64 = 1e-3;
 
+/// Four numbers for every value, and their changes up to the next entry.
+pub(super) type Entries = [[f32; 8]; ENTRIES];
+
 /// The light and opacity of one slice for every value.
 #[derive(Debug, Clone)]
 pub(super) struct Table {
@@ -22,15 +25,21 @@ pub(super) struct Table {
     length: f64,
     pub(super) units: Units,
     /// Red, green and blue times the opacity, and minus the opacity; then the change up to the next entry.
-    pub(super) entries: Box<[[f32; 8]; ENTRIES]>,
+    pub(super) entries: Box<Entries>,
+    /// Red, green and blue, and the power of two by which light falls; then the change up to the next entry.
+    pub(super) colours: Box<Entries>,
     /// The number of entries before each that are visible.
     visible: Vec<u16>,
 }
 
+/// The extinction along `length` units of a ray.
+fn extinction(transfer: &TransferFunction, length: f64, value: f64) -> f64 {
+    -libm::log1p(-transfer.opacity(value).min(MOST_OPAQUE)) * length
+}
+
 /// Red, green and blue times the opacity, and minus the opacity, of a slice in which rays are `length` units long.
 fn light(transfer: &TransferFunction, length: f64, value: f64) -> [f64; 4] {
-    let extinction = -libm::log1p(-transfer.opacity(value).min(MOST_OPAQUE));
-    let opacity = -libm::expm1(-extinction * length);
+    let opacity = -libm::expm1(-extinction(transfer, length, value));
     let [r, g, b] = transfer.colour(value).unwrap_or_default();
     [r * opacity, g * opacity, b * opacity, -opacity]
 }
@@ -92,22 +101,28 @@ impl Table {
         let (lo, hi) = range(transfer);
         let last = steps(transfer, lo, hi);
         let units = Units { zero: lo, per: last as f64 / (hi - lo) };
-        let value = |at: f64| light(transfer, length, lo + (at / units.per).min(hi - lo)).map(|number| number as f32);
-        let ends: Vec<[f32; 4]> = (0..=ENTRIES).map(|n| if n < last { value(n as f64) } else { value(1e9) }).collect();
-        let entry = |n: usize| {
-            let near = [value(n as f64 + NEAR), value((n + 1) as f64 - NEAR)];
-            // Where a value next to a transparent end is transparent, the opacities have a point inside.
-            let is_edge = (ends[n][3] == 0.0) != (ends[n + 1][3] == 0.0) && near.iter().any(|light| light[3] == 0.0);
-            let (from, to) = if is_edge { ([0.0; 4], [0.0; 4]) } else { (ends[n], ends[n + 1]) };
-            std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] - from[i - 4] })
+        let value = |at: f64| lo + (at / units.per).min(hi - lo);
+        let light = |at: f64| light(transfer, length, value(at)).map(|number| number as f32);
+        let colour = |at: f64| {
+            let [r, g, b] = transfer.colour(value(at)).unwrap_or_default();
+            [r, g, b, extinction(transfer, length, value(at)) * std::f64::consts::LOG2_E].map(|number| number as f32)
         };
-        let entries: Box<[[f32; 8]; ENTRIES]> = Box::new(std::array::from_fn(entry));
+        // Where a value next to a transparent end is transparent, the opacities have a point inside.
+        let is_edge = |n: usize| {
+            let near = [light(n as f64 + NEAR), light((n + 1) as f64 - NEAR)];
+            let ends = [n, n + 1].map(|n| light(place(n, last))[3] == 0.0);
+            ends[0] != ends[1] && near.iter().any(|light| light[3] == 0.0)
+        };
+        let is_edge: Vec<bool> = (0..ENTRIES).map(is_edge).collect();
+        let entries = entries(last, light, |n, light| if is_edge[n] { [0.0; 4] } else { light });
+        let colours = |n: usize, [r, g, b, extinction]: [f32; 4]| [r, g, b, if is_edge[n] { 0.0 } else { extinction }];
+        let colours = self::entries(last, colour, colours);
         let count = |sum: &mut u16, entry: &[f32; 8]| {
             *sum += u16::from(entry[3] != 0.0);
             Some(*sum)
         };
         let visible = std::iter::once(0).chain(entries.iter().scan(0, count)).collect();
-        Self { transfer: transfer.clone(), length, units, entries, visible }
+        Self { transfer: transfer.clone(), length, units, entries, colours, visible }
     }
 
     /// A gradient, in these units per world unit, whose direction means little: a hundredth of the range within eight
@@ -149,6 +164,69 @@ impl Table {
         };
         let values = (0..8 * ENTRIES).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
         values.map(off).fold(0.0, f64::max)
+    }
+}
+
+/// The place of an entry; beyond the last value, one that is far enough to have this value.
+fn place(n: usize, last: usize) -> f64 {
+    if n < last { n as f64 } else { 1e9 }
+}
+
+/// Tabulates four numbers, which are given at the places from 0 to `last`. `within` may change those of an entry's step.
+fn entries(
+    last: usize,
+    numbers: impl Fn(f64) -> [f32; 4],
+    within: impl Fn(usize, [f32; 4]) -> [f32; 4],
+) -> Box<Entries> {
+    let ends: Vec<[f32; 4]> = (0..=ENTRIES).map(|n| numbers(place(n, last))).collect();
+    let entry = |n: usize| {
+        let (from, to) = (within(n, ends[n]), within(n, ends[n + 1]));
+        std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] - from[i - 4] })
+    };
+    Box::new(std::array::from_fn(entry))
+}
+
+/// The light of slabs that count as one slice.
+pub(super) struct SlabTable {
+    pub(super) table: Table,
+    /// The largest change of the values from slab to slab, at each entry, for which one slice is as good as several.
+    pub(super) steady: Box<[f32; ENTRIES]>,
+}
+
+impl SlabTable {
+    /// For slabs of `parts` slices, whose light is that of `slices`.
+    pub(super) fn new(slices: &Table, parts: usize) -> Self {
+        let table = Table::new(&slices.transfer, slices.length * parts as f64);
+        let at_entry: Vec<f32> = (0..=ENTRIES).map(|n| table.steady(slices, parts, n as f32)).collect();
+        let steady = Box::new(std::array::from_fn(|n| at_entry[n].min(at_entry[n + 1])));
+        Self { table, steady }
+    }
+}
+
+/// A slab counts as one slice if light and opacity are off by less than this: a fortieth of a level of an 8-bit picture.
+const SAME: f32 = 1e-4;
+/// How much more a value may change within a slab than from the slab before.
+const CAUTION: f32 = 2.0;
+
+impl Table {
+    /// The largest change from the slab before for which the light of a slab around a value is that of its slices.
+    fn steady(&self, slices: &Self, parts: usize, value: f32) -> f32 {
+        let changes = (0..=2 * ENTRIES.ilog2()).map(|n| 0.5 * 2.0_f32.powf(n as f32 / 2.0));
+        let is_same =
+            |change: &f32| [-change, *change].iter().all(|change| self.off(slices, parts, value, *change) < SAME);
+        changes.take_while(is_same).last().unwrap_or(0.0) / CAUTION
+    }
+
+    /// How far the light of a slab is from that of its slices, along which the value changes by `change`.
+    fn off(&self, slices: &Self, parts: usize, value: f32, change: f32) -> f32 {
+        let mut light = [0.0, 0.0, 0.0, 1.0];
+        for part in 0..parts {
+            let (place, through) = ((part as f32 + 0.5) / parts as f32 - 0.5, light[3]);
+            let of_slice = slices.at(value + place * change);
+            light.iter_mut().zip(of_slice).for_each(|(light, more)| *light += through * more);
+        }
+        light[3] -= 1.0;
+        light.iter().zip(self.at(value)).map(|(light, slab)| (light - slab).abs()).fold(0.0, f32::max)
     }
 }
 
@@ -214,5 +292,36 @@ mod tests {
         }
         let sharp = grey().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
         assert!(Table::new(&sharp, 1.0).error() > 0.1);
+    }
+
+    /// The slices' light is computed from the transfer function here, at values that change as much as they may.
+    #[test]
+    fn slabs_that_count_as_one_slice_have_the_light_of_their_slices() {
+        let peaks = vec![(0.1, 0.0), (0.2, 0.6), (0.3, 0.0), (0.6, 0.0), (0.61, 0.9), (1.0, 1.0)];
+        for (points, parts) in [(peaks, 8), (vec![(0.0, 0.0), (1.0, 1.0)], 3), (vec![(0.4, 0.0), (0.5, 0.02)], 2)] {
+            let map = TransferFunction::open("viridis").expect("a map").with_opacity(&points).expect("points");
+            let slices = Table::new(&map, 0.9 / parts as f64);
+            let slabs = SlabTable::new(&slices, parts);
+            let allowed = f64::from(SAME) + slabs.table.error() + parts as f64 * slices.error();
+            let value = |number: f32| f64::from(number) / slices.units.per + slices.units.zero;
+            for n in 0..20_000_u32 {
+                let number = (n.wrapping_mul(2_654_435_761) >> 8) as f32 / 30_000.0 - 20.0;
+                let most = CAUTION * slabs.steady[number.clamp(0.0, LAST as f32) as usize];
+                let change = if n % 2 == 0 { most } else { -most };
+                let mut light = [0.0, 0.0, 0.0, 1.0];
+                for part in 0..parts {
+                    let (place, through) = ((part as f32 + 0.5) / parts as f32 - 0.5, light[3]);
+                    let of_slice = slices.exact(value(number + place * change), 1.0);
+                    light.iter_mut().zip(of_slice).for_each(|(light, more)| *light += through * more);
+                }
+                light[3] -= 1.0;
+                let of_slab = slabs.table.exact(value(number), 1.0);
+                let off = light.iter().zip(of_slab).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(off < allowed, "{points:?} {number} {change}: {off:e}");
+            }
+            let [much, little] = [|most: &&f32| **most >= 1.0, |most: &&f32| **most < 0.5];
+            let [much, little] = [slabs.steady.iter().filter(much).count(), slabs.steady.iter().filter(little).count()];
+            assert!(much > 50 && (parts == 2 || little > 50), "{points:?}: {much} {little}");
+        }
     }
 }

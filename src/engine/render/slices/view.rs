@@ -41,9 +41,11 @@ pub(in crate::render) struct SlicedView {
     pub(super) reach: [usize; 3],
     /// Cells per voxel along b and c.
     pub(in crate::render) cells: usize,
-    /// Slices per voxel along a.
-    fineness: usize,
-    /// Voxels beyond the kernel that decide whether a cell is visible: what is between two slices shows in both.
+    /// Slabs per voxel along a, and slices per slab.
+    slabs: usize,
+    parts: usize,
+    /// Voxels beyond the kernel that decide whether a cell is visible: what is between two slices of a surface shows in
+    /// both, and what is in a slab counts for all its slices.
     pub(super) margin: usize,
     /// The lattice's first cell, in whole voxels.
     corner: [i64; 2],
@@ -57,10 +59,32 @@ pub(in crate::render) struct SlicedView {
 #[derive(Debug, Clone)]
 pub(super) struct Slice {
     pub(super) number: u32,
+    /// The number of slices in whose place it stands, and the mean of their densities as a share of its own.
+    pub(super) thickness: u32,
+    pub(super) filling: f64,
     /// Weights along a; voxels are counted from the first that a ray meets.
     pub(super) along: Taps,
     /// Weights of each phase along b and c: those of cell `phase`. `cells` further on, they move by a voxel.
     pub(super) across: [Vec<Taps>; 2],
+}
+
+/// A part of all rays at most a voxel thick: a few slices, or one in place of them where light hardly changes.
+#[derive(Debug, Clone)]
+pub(super) struct Slab {
+    /// The slice in its middle, as thick as the slab.
+    pub(super) middle: Slice,
+    /// Its slices; none if the slab is one.
+    pub(super) slices: Vec<Slice>,
+    /// Whether rays in the middle are long enough to stand in place of the slices.
+    pub(super) is_met: bool,
+}
+
+impl Slab {
+    /// Bytes of the weights of a view's slabs, each.
+    pub(super) fn bytes(view: &SlicedView) -> usize {
+        let slices = if view.parts > 1 { 1 + view.parts } else { 1 };
+        size_of::<Self>() + slices * Slice::bytes(view)
+    }
 }
 
 impl Slice {
@@ -109,8 +133,11 @@ impl SlicedView {
         let cells = config.mode.slices().unwrap_or_else(|| default_cells(&config.mode, &sigma, pixels));
         let deeper = camera.step(shear.axes[2], 1.0)[2];
         let voxel = grid.spacing[shear.axes[2]] / deeper.abs();
-        let fineness = config.mode.slices().unwrap_or_else(|| default_slices(&config.mode, sigma[2], voxel, grid));
-        let step = voxel / fineness as f64;
+        let [slabs, parts] = match config.mode.slices() {
+            Some(slices) => [slices, 1],
+            None => default_slices(&config.mode, sigma[2], voxel, grid),
+        };
+        let step = voxel / (slabs * parts) as f64;
         let mut cut = Self {
             camera,
             shear,
@@ -122,8 +149,9 @@ impl SlicedView {
             sigma,
             reach: sigma.map(reach),
             cells,
-            fineness,
-            margin: usize::from(config.mode.is_of_surfaces()),
+            slabs,
+            parts,
+            margin: usize::from(config.mode.is_of_surfaces() || parts > 1),
             corner: [0; 2],
             extent: [0; 2],
             step,
@@ -190,50 +218,77 @@ impl SlicedView {
     pub(super) fn slices_before(&self, at: f64) -> f64 {
         let last = (self.start[2] + self.count[2] - 1) as f64;
         let met = if self.reversed { last - at } else { at - self.start[2] as f64 };
-        (met + self.reach[2] as f64) * self.fineness as f64
+        (met + self.reach[2] as f64) * (self.slabs * self.parts) as f64
     }
 
     /// Number of slices.
     pub(in crate::render) fn slices(&self) -> usize {
-        (self.count[2] - 1 + 2 * self.reach[2]) * self.fineness
+        self.all_slabs() * self.parts
     }
 
-    /// The position of a slice along a, in voxels from the first that a ray meets.
-    fn position(&self, number: usize) -> f64 {
-        (number as f64 + 0.5) / self.fineness as f64 - self.reach[2] as f64
+    /// Number of slabs.
+    pub(super) fn all_slabs(&self) -> usize {
+        (self.count[2] - 1 + 2 * self.reach[2]) * self.slabs
     }
 
-    /// The slices that need no voxel from `met` on, of all from `first` on: a range of numbers.
+    /// Whether slabs have several slices.
+    pub(super) fn has_parts(&self) -> bool {
+        self.parts > 1
+    }
+
+    /// The number of slices of a slab.
+    pub(super) fn parts(&self) -> usize {
+        self.parts
+    }
+
+    /// The position of the middle of a slice, or of a slab if `slabs` are that many per voxel: in voxels from the first that a ray meets.
+    fn position(&self, number: usize, per_voxel: usize) -> f64 {
+        (number as f64 + 0.5) / per_voxel as f64 - self.reach[2] as f64
+    }
+
+    /// The slabs that need no voxel from `met` on, of all from `first` on: a range of numbers.
     pub(super) fn ready(&self, first: usize, met: usize) -> Range<usize> {
         let beyond = (self.reach[2] + self.margin) as i64;
-        let needs = |number: &usize| self.position(*number).floor() as i64 + beyond;
-        let all = self.slices();
+        let needs = |number: &usize| self.position(*number, self.slabs).floor() as i64 + beyond;
+        let all = self.all_slabs();
         if met >= self.count[2] {
             return first..all;
         }
         first..(first..all).find(|number| needs(number) >= met as i64).unwrap_or(all)
     }
 
-    /// The first voxel along a, counted along the ray, that slices from `number` on need.
+    /// The first voxel along a, counted along the ray, that slabs from `number` on need.
     pub(super) fn first_needed(&self, number: usize) -> usize {
         let beyond = (self.reach[2] + self.margin) as i64;
-        (self.position(number).floor() as i64 + 1 - beyond).clamp(0, self.count[2] as i64) as usize
+        (self.position(number, self.slabs).floor() as i64 + 1 - beyond).clamp(0, self.count[2] as i64) as usize
     }
 
-    /// A slice; `None` if the ray is too short in all of it.
-    pub(super) fn slice(&self, number: usize) -> Option<Slice> {
-        let along = Taps::new(self.position(number), self.sigma[2]);
-        if along.presence(0, self.count[2]) * (along.density as f32) < LEAST {
-            return None;
+    /// A slab; `None` if the ray is too short in all of it.
+    pub(super) fn slab(&self, number: usize) -> Option<Slab> {
+        let density = |slice: &Slice| f64::from(slice.along.presence(0, self.count[2])) * slice.along.density;
+        let is_met = |slice: &Slice| density(slice) as f32 >= LEAST;
+        let first = number * self.parts;
+        let mut middle = self.slice(self.position(number, self.slabs), first);
+        let part = |n: usize| self.slice(self.position(first + n, self.slabs * self.parts), first + n);
+        let parts = if self.has_parts() { 0..self.parts } else { 0..0 };
+        let slices: Vec<Slice> = parts.map(part).filter(is_met).collect();
+        let is_met = is_met(&middle);
+        if is_met && self.has_parts() {
+            middle.thickness = self.parts as u32;
+            middle.filling = slices.iter().map(density).sum::<f64>() / (self.parts as f64 * density(&middle));
         }
-        let cell = |i: usize, phase: usize| self.corner[i] as f64 + phase as f64 / self.cells as f64;
-        let across = [0, 1].map(|i| (0..self.cells).map(|phase| self.taps(number, i, cell(i, phase))).collect());
-        Some(Slice { number: number as u32, along, across })
+        (is_met || !slices.is_empty()).then_some(Slab { middle, slices, is_met })
     }
 
-    /// The weights along b or c of a cell's position in a slice.
-    fn taps(&self, number: usize, i: usize, cell: f64) -> Taps {
-        let position = self.position(number);
+    /// The slice at a position along a.
+    fn slice(&self, position: f64, number: usize) -> Slice {
+        let cell = |i: usize, phase: usize| self.corner[i] as f64 + phase as f64 / self.cells as f64;
+        let across = [0, 1].map(|i| (0..self.cells).map(|phase| self.taps(position, i, cell(i, phase))).collect());
+        Slice { number: number as u32, thickness: 1, filling: 1.0, along: Taps::new(position, self.sigma[2]), across }
+    }
+
+    /// The weights along b or c of a cell's position in a slice at a position along a.
+    fn taps(&self, position: f64, i: usize, cell: f64) -> Taps {
         let voxel = if self.reversed {
             (self.start[2] + self.count[2] - 1) as f64 - position
         } else {
@@ -244,8 +299,9 @@ impl SlicedView {
 
     /// The weights along b, c and a where the ray of a cell crosses a slice.
     pub(super) fn taps_at(&self, number: usize, cell: [f64; 2]) -> [Taps; 3] {
-        let [b, c] = [0, 1].map(|i| self.taps(number, i, cell[i]));
-        [b, c, Taps::new(self.position(number), self.sigma[2])]
+        let position = self.position(number, self.slabs * self.parts);
+        let [b, c] = [0, 1].map(|i| self.taps(position, i, cell[i]));
+        [b, c, Taps::new(position, self.sigma[2])]
     }
 
     /// The change per world unit of a value that changes by 1 per voxel along b, c and a. Voxels along a are counted
@@ -269,12 +325,12 @@ impl SlicedView {
 
     /// The distance of two slices, in voxels along a.
     pub(super) fn between(&self) -> f64 {
-        1.0 / self.fineness as f64
+        1.0 / (self.slabs * self.parts) as f64
     }
 
-    /// The same view with `fineness` slices per voxel, and the number of slices of this view per slice of that one.
-    pub(super) fn with_slices(&self, fineness: usize) -> (Self, f64) {
-        (Self { fineness, ..self.clone() }, self.fineness as f64 / fineness as f64)
+    /// The same view with `slices` slices per voxel, each a slab, and the number of slices of this view per slice of that one.
+    pub(super) fn with_slices(&self, slices: usize) -> (Self, f64) {
+        (Self { slabs: slices, parts: 1, ..self.clone() }, (self.slabs * self.parts) as f64 / slices as f64)
     }
 
     /// The place of voxel layer `at` (an index along the grid's axis a), counted along the ray.
@@ -307,16 +363,16 @@ fn default_cells(mode: &Mode, sigma: &[f64; 3], pixels: f64) -> usize {
     if mode.is_of_surfaces() { smooth.max(per_voxel(1.0 / pixels)) } else { smooth }
 }
 
-/// The default number of slices per voxel for a kernel of `sigma` voxels. `voxel` is the length of a ray along which it
-/// crosses a voxel.
-fn default_slices(mode: &Mode, sigma: f64, voxel: f64, grid: &Grid) -> usize {
+/// The default numbers of slabs per voxel and of slices per slab for a kernel of `sigma` voxels. `voxel` is the length of a ray
+/// along which it crosses a voxel.
+fn default_slices(mode: &Mode, sigma: f64, voxel: f64, grid: &Grid) -> [usize; 2] {
     match mode {
         Mode::Composite { transfer, unit, .. } => {
             let length = voxel / unit.unwrap_or_else(|| grid.largest_spacing());
             let sharp = (change(transfer, length) / SMOOTH).ceil().clamp(1.0, 8.0) as usize;
-            sharp * per_voxel(COARSE * sigma)
+            [per_voxel(COARSE * sigma), sharp]
         }
-        _ => per_voxel(FINE * sigma),
+        _ => [per_voxel(FINE * sigma), 1],
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::modes;
 use super::planes::{planes_of, with_planes};
-use super::ranges::{self, Needed, Ranges};
+use super::ranges::{self, Needed, Overview, Ranges};
 use super::targets::Targets;
 use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
 use crate::picture::reporter::Reporter;
@@ -153,14 +153,17 @@ pub(in crate::picture) fn automatic_colours(
     if config.mode.pixel() != Pixel::Light {
         return Ok(Some(colours));
     }
+    let mut overview = None;
     if modes::has_automatic_range(request)? {
         let needed = Needed { pictures: true, errors: false };
-        colours = Ranges::small(scene, config, needed, reporter)?.stretch(&colours)?;
+        let ranges = Ranges::small(scene, config, needed, reporter)?;
+        colours = ranges.stretch(&colours)?;
+        overview = ranges.into_overview();
         let (lo, hi) = colours.range();
         reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
     }
     if modes::suggests_opacities(request, &colours) {
-        colours = suggested_opacities(request, scene, config, &colours, reporter)?;
+        colours = suggested_opacities(request, scene, config, &colours, overview.as_ref(), reporter)?;
     }
     let planes = planes_of(&config.mode);
     config.mode = with_planes(modes::mode(request, Some(&colours))?, planes);
@@ -187,9 +190,12 @@ fn suggested_opacities(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     colours: &TransferFunction,
+    overview: Option<&Overview>,
     reporter: &dyn Reporter,
 ) -> Result<TransferFunction> {
-    let Some(samples) = ranges::distribution(scene, config, reporter)? else { return Ok(colours.clone()) };
+    let Some(samples) = ranges::distribution(scene, config, overview, reporter)? else {
+        return Ok(colours.clone());
+    };
     let grid = scene.grid();
     let volume: f64 = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).product();
     let path = volume.cbrt() / modes::opacity_unit(request, grid);

@@ -43,14 +43,38 @@ const MEMORY_SHARE: usize = 32;
 /// The largest number of samples of a distribution.
 const MOST_OF_DISTRIBUTION: usize = 1 << 20;
 
-/// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview.
+/// An overview of a few frames, as [`Scene::overview`] gives it.
+pub(in crate::picture) struct Overview {
+    stride: usize,
+    frames: Vec<usize>,
+    samples: Vec<f32>,
+}
+
+impl Overview {
+    /// The samples of some of its frames, if it has them with this stride, in one channel.
+    fn of_frames(&self, stride: usize, frames: &[usize]) -> Option<Vec<f32>> {
+        let of_frame = self.samples.len() / self.frames.len().max(1);
+        let place = |frame: &usize| self.frames.binary_search(frame).ok();
+        let places: Vec<usize> = frames.iter().map(place).collect::<Option<_>>()?;
+        let samples = || places.iter().flat_map(|n| &self.samples[n * of_frame..][..of_frame]);
+        (self.stride == stride).then(|| samples().copied().collect())
+    }
+}
+
+/// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview. `held` may be an overview
+/// of these samples.
 pub(in crate::picture) fn distribution(
     scene: &mut dyn Scene,
     config: &RenderConfig,
+    held: Option<&Overview>,
     reporter: &dyn Reporter,
 ) -> Result<Option<Distribution>> {
-    let frames = spread(scene, LEAST_FRAMES);
-    distribution_of_frames(scene, config, &frames, reporter)
+    let small = small(config);
+    let (frames, thinning) = (spread(scene, LEAST_FRAMES), thinning_of_distribution(scene, &small)?);
+    match held.and_then(|held| held.of_frames(thinning.stride, &frames)) {
+        Some(samples) => Ok(Some(Distribution::new(samples))),
+        None => distribution_of_frames(scene, config, &frames, reporter),
+    }
 }
 
 /// The same for these frames.
@@ -61,14 +85,20 @@ pub(in crate::picture) fn distribution_of_frames(
     reporter: &dyn Reporter,
 ) -> Result<Option<Distribution>> {
     let small = small(config);
-    let mut thinning = thinning(scene, &small)?;
-    while voxels(&thinning) * LEAST_FRAMES > MOST_OF_DISTRIBUTION && thinning.stride < 64 {
-        thinning.stride *= 2;
-    }
+    let thinning = thinning_of_distribution(scene, &small)?;
     let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
     let request = OverviewRequest { thinning, frames, memory: small.memory, region };
     let samples = scene.overview(&request, reporter.progress("overview", "steps").as_ref())?;
     Ok(samples.map(Distribution::new))
+}
+
+/// How to thin a scene for a distribution.
+fn thinning_of_distribution(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
+    let mut thinning = thinning(scene, small)?;
+    while voxels(&thinning) * LEAST_FRAMES > MOST_OF_DISTRIBUTION && thinning.stride < 64 {
+        thinning.stride *= 2;
+    }
+    Ok(thinning)
 }
 
 /// The range of ascending values. At each end, up to one value in 200 is left out if these take two fifths of the
@@ -149,12 +179,13 @@ fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, reporter: &dyn 
     Ok(values)
 }
 
-/// The values of small pictures of an overview; none if the scene has none, or the volume is too small for one.
+/// The values of small pictures of an overview, and the overview; none if the scene has none, or the volume is too small for
+/// one.
 fn values_of_overview(
     scene: &mut dyn Scene,
     small: &RenderConfig,
     reporter: &dyn Reporter,
-) -> Result<Option<Vec<f32>>> {
+) -> Result<Option<(Vec<f32>, Overview)>> {
     if matches!(small.mode, Mode::Planes { .. }) {
         return Ok(None);
     }
@@ -179,7 +210,8 @@ fn values_of_overview(
             _ => pictures(&mut frames, &config, &Silent, &mut values)?,
         };
     }
-    Ok(Some(values))
+    let stride = thinning.stride;
+    Ok(Some((values, Overview { stride, frames, samples: overview })))
 }
 
 /// How to thin a scene for small pictures.
@@ -242,11 +274,19 @@ pub(in crate::picture) struct Ranges {
     pub(in crate::picture) errors: (f64, f64),
     /// The values of small pictures.
     all: Distribution,
+    /// The overview that they show, if there is one.
+    overview: Option<Overview>,
 }
 
 impl Default for Ranges {
     fn default() -> Self {
-        Self { values: (0.0, 1.0), positive: Some(1.0), errors: (0.0, 1.0), all: Distribution::default() }
+        Self {
+            values: (0.0, 1.0),
+            positive: Some(1.0),
+            errors: (0.0, 1.0),
+            all: Distribution::default(),
+            overview: None,
+        }
     }
 }
 
@@ -268,8 +308,13 @@ impl Ranges {
         let small = small(config);
         if needed.pictures {
             let rough = rough(&small);
-            let values = values_of_overview(scene, &rough, reporter)?;
-            ranges.set_values(values.map_or_else(|| values_of_frames(scene, &rough, reporter), Ok)?);
+            match values_of_overview(scene, &rough, reporter)? {
+                Some((values, overview)) => {
+                    ranges.set_values(values);
+                    ranges.overview = Some(overview);
+                }
+                None => ranges.set_values(values_of_frames(scene, &rough, reporter)?),
+            }
         }
         if needed.errors {
             let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
@@ -306,6 +351,11 @@ impl Ranges {
             self.values = robust_range(values);
             self.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
         }
+    }
+
+    /// The overview that the ranges were found in, if there is one.
+    pub(in crate::picture) fn into_overview(self) -> Option<Overview> {
+        self.overview
     }
 
     /// The values that show the background, if small pictures have much empty space.
