@@ -24,15 +24,14 @@ impl SampledView<'_> {
         memory::least(|memory| alone + scene.shared_bytes(memory))
     }
 
-    /// Renders all frames, as many at a time as fit. `render` makes the pictures of a batch, frame after frame; `give`
-    /// takes them.
-    pub(in crate::render) fn render(
+    /// Renders all frames, as many at a time as fit. `render` makes what the pictures of a batch are made of; `give` takes it.
+    pub(in crate::render) fn render<P>(
         &self,
         scene: &mut dyn Scene,
         progress: &dyn Progress,
         report: &mut RenderReport,
-        mut render: impl FnMut(&SampleReader<'_>, &mut RenderReport) -> Result<Vec<f32>>,
-        mut give: impl FnMut(&[usize], &[f32]) -> Result<()>,
+        mut render: impl FnMut(&SampleReader<'_>, &mut RenderReport) -> Result<P>,
+        mut give: impl FnMut(&[usize], P, &mut RenderReport) -> Result<()>,
     ) -> Result<()> {
         let (blocks, at_a_time) = (scene.blocks(), self.blocks_at_a_time(scene));
         let planned = Cell::new(0);
@@ -46,7 +45,9 @@ impl SampledView<'_> {
         let render = |batch: &dyn FrameBatch, report: &mut RenderReport| {
             render(&SampleReader { batch, blocks, at_a_time, progress }, report)
         };
-        for_each_batch(scene, job, report, render, |frames, channels, _| give(frames, &channels[0].pictures))?;
+        for_each_batch(scene, job, report, render, |frames, channels, report| {
+            channels.into_iter().try_for_each(|channel| give(frames, channel.pictures, report))
+        })?;
         report.planned_bytes = report.planned_bytes.max(planned.get() as u64);
         Ok(())
     }

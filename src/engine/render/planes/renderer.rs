@@ -51,9 +51,9 @@ impl Renderer for Planes {
             let sampled = SampledView { config: &config, frame_bytes: &|frames| view.bytes(frames) };
             let render =
                 |reader: &SampleReader<'_>, report: &mut RenderReport| PlanesPass { view, reader }.pictures(report);
-            sampled.render(scene, *progress, report, render, |frames, pictures| {
+            sampled.render(scene, *progress, report, render, |frames, pictures, _| {
                 progress.advance(frames.len() as u64);
-                give(*sink, number, frames, pictures)
+                give(*sink, number, frames, &pictures)
             })?;
         }
         Ok(())

@@ -69,9 +69,14 @@ pub(in crate::render) fn bytes<B: Blend>(
     let layers = Layers::bytes(view, most_layers(view, blocks));
     let last = if view.has_parts() { size_of::<LastMeans>() } else { 0 };
     let cells = groups(view) * (size_of::<B::Group>() + size_of::<f32>() + last);
-    let picture = view.camera.size.iter().product::<usize>() * B::NUMBERS * size_of::<f32>();
+    let picture = numbers::<B>(view) * size_of::<f32>();
     let sweep = rayon::current_num_threads() * SweepScratch::bytes(view, rows_of_band(view), is_shaded);
-    frames * (layers + cells + picture) + sweep.max(finish::bytes::<B>(view)) + SLABS * Slab::bytes(view)
+    frames * (layers + cells) + sweep.max(picture + finish::bytes::<B>(view)) + SLABS * Slab::bytes(view)
+}
+
+/// The numbers of a picture.
+fn numbers<B: Blend>(view: &SlicedView) -> usize {
+    view.camera.size.iter().product::<usize>() * B::NUMBERS
 }
 
 /// Rows of each band.
@@ -81,8 +86,8 @@ fn rows_of_band(view: &SlicedView) -> usize {
 }
 
 impl<B: Blend> SlicePass<'_, B> {
-    /// The pictures of all frames, one after another.
-    pub(in crate::render) fn pictures(&self, report: &mut RenderReport) -> Result<Vec<f32>> {
+    /// Sweeps the slices of all frames.
+    pub(in crate::render) fn sweep(&self, report: &mut RenderReport) -> Result<Swept<B>> {
         let SampleReader { batch, blocks, progress, .. } = *self.reader;
         let known = Known::new(self.view, blocks, batch.selection());
         let (units, most) = (self.units(&known)?, most_layers(self.view, blocks));
@@ -110,11 +115,8 @@ impl<B: Blend> SlicePass<'_, B> {
             progress.advance((ready.len() * self.view.parts() * units.len()) as u64);
         }
         progress.advance(((self.view.all_slabs() - next) * self.view.parts() * units.len()) as u64);
-        let mut clock = Instant::now();
-        let pictures = self.finish(&frames);
-        report.views[self.number].probed = probe.map_or(report.views[self.number].probed, |p| p.errors(&pictures));
-        lap(&mut clock, &mut report.inverse_seconds);
-        Ok(pictures)
+        let swept = |frame: Frame<B>| SweptFrame { units: frame.units, groups: frame.groups };
+        Ok(Swept { frames: frames.into_iter().map(swept).collect(), probe })
     }
 
     /// The first and the last voxel along a of each layer of blocks, in the order in which rays meet them.
@@ -215,13 +217,39 @@ impl<B: Blend> SlicePass<'_, B> {
             slabs.iter().for_each(|slab| band.add(slab, &frame.layers));
         });
     }
+}
 
-    fn finish(&self, frames: &[Frame<B>]) -> Vec<f32> {
-        let [width, height] = self.view.camera.size;
-        let mut pictures = vec![0.0; frames.len() * width * height * B::NUMBERS];
-        let of_frames = pictures.chunks_exact_mut(width * height * B::NUMBERS).zip(frames);
-        of_frames.for_each(|(picture, frame)| finish::finish::<B>(self.view, &frame.units, &frame.groups, picture));
-        pictures
+/// The frames of a batch behind all slices, and rays that probe the first of them.
+pub(in crate::render) struct Swept<B: Blend> {
+    frames: Vec<SweptFrame<B>>,
+    probe: Option<Probe<B>>,
+}
+
+struct SweptFrame<B: Blend> {
+    units: Units,
+    groups: Vec<B::Group>,
+}
+
+impl<B: Blend> Swept<B> {
+    /// Gives the pictures of view `number` one after another, with their places in the batch.
+    pub(in crate::render) fn pictures(
+        self,
+        view: &SlicedView,
+        number: usize,
+        report: &mut RenderReport,
+        mut give: impl FnMut(usize, &mut [f32]) -> Result<()>,
+    ) -> Result<()> {
+        let (mut probe, mut picture) = (self.probe, vec![0.0; numbers::<B>(view)]);
+        for (n, SweptFrame { units, groups }) in self.frames.into_iter().enumerate() {
+            let mut clock = Instant::now();
+            finish::finish::<B>(view, &units, &groups, &mut picture);
+            if let Some(probe) = probe.take() {
+                report.views[number].probed = probe.errors(&picture);
+            }
+            lap(&mut clock, &mut report.inverse_seconds);
+            give(n, &mut picture)?;
+        }
+        Ok(())
     }
 }
 

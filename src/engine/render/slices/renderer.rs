@@ -1,13 +1,14 @@
 //! Composites, isosurfaces and maximum intensity projections: every frame batch slice by slice, one view after another.
 
-use super::batch::{SlicePass, bytes};
+use super::batch::{SlicePass, Swept, bytes};
 use super::row::Blend;
 use super::stops::Stops;
 use super::view::SlicedView;
+use crate::render::Rendered;
 use crate::render::batches::{SampleReader, SampledView, Scene};
 use crate::render::config::{Pixel, Plane, RenderConfig, ViewTask};
 use crate::render::planes::{PlanesPass, PlanesView};
-use crate::render::renderer::{Output, Renderer, give};
+use crate::render::renderer::{Output, Renderer};
 use crate::render::report::{RenderReport, ViewReport};
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{BlockGrid, Grid};
@@ -62,14 +63,21 @@ impl<'a, B: Blend> Sliced<'a, B> {
         let behind = self.planes.map(|planes| Behind::new(scene.grid(), config, number, view, planes)).transpose()?;
         let render = |reader: &SampleReader<'_>, report: &mut RenderReport| {
             let stops = behind.as_ref().map(|behind| &behind.stops);
-            let mut pictures = SlicePass { number, view, blend: &blend, stops, reader }.pictures(report)?;
-            if let Some(behind) = &behind {
-                behind.put(&mut pictures, &PlanesPass { view: &behind.planes, reader }.pictures(report)?);
-            }
-            Ok(pictures)
+            let swept = SlicePass { number, view, blend: &blend, stops, reader }.sweep(report)?;
+            let planes = behind.as_ref().map(|behind| PlanesPass { view: &behind.planes, reader }.pictures(report));
+            Ok((swept, planes.transpose()?))
+        };
+        let give = |frames: &[usize], (swept, planes): (Swept<B>, Option<Vec<f32>>), report: &mut RenderReport| {
+            swept.pictures(view, number, report, |n, picture| {
+                if let (Some(behind), Some(planes)) = (&behind, &planes) {
+                    let each = planes.len() / frames.len();
+                    behind.put(picture, &planes[n * each..][..each]);
+                }
+                sink(Rendered { views: &[], view: number, frame: frames[n], picture, error: None })
+            })
         };
         let sampled = SampledView { config, frame_bytes: &|frames| self.bytes(config, view, blocks, frames) };
-        sampled.render(scene, *progress, report, render, |frames, pictures| give(*sink, number, frames, pictures))
+        sampled.render(scene, *progress, report, render, give)
     }
 }
 
