@@ -24,7 +24,7 @@ impl SampledView<'_> {
         memory::least(|memory| alone + scene.shared_bytes(memory))
     }
 
-    /// Renders all frames, as many at a time as fit. `render` makes what the pictures of a batch are made of; `give` takes it.
+    /// Renders all frames of one channel, as many at a time as fit. `render` renders a batch, and `give` takes what it returns.
     pub(in crate::render) fn render<P>(
         &self,
         scene: &mut dyn Scene,
@@ -46,7 +46,7 @@ impl SampledView<'_> {
             render(&SampleReader { batch, blocks, at_a_time, progress }, report)
         };
         for_each_batch(scene, job, report, render, |frames, channels, report| {
-            channels.into_iter().try_for_each(|channel| give(frames, channel.pictures, report))
+            channels.into_iter().next().map_or(Ok(()), |channel| give(frames, channel.pictures, report))
         })?;
         report.planned_bytes = report.planned_bytes.max(planned.get() as u64);
         Ok(())

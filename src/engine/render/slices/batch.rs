@@ -13,7 +13,7 @@ use crate::render::report::{RenderReport, lap};
 use rayon::prelude::*;
 use std::time::Instant;
 use wavesplat_core::base::error::Result;
-use wavesplat_core::base::grid::BlockGrid;
+use wavesplat_core::base::grid::{BlockGrid, Region};
 
 /// A batch of frames, seen from one view.
 pub(in crate::render) struct SlicePass<'a, B: Blend> {
@@ -56,7 +56,7 @@ fn groups(view: &SlicedView) -> usize {
 
 /// The largest number of voxel layers at a time: those of a layer of blocks, and those before that slices still need.
 fn most_layers(view: &SlicedView, blocks: BlockGrid) -> usize {
-    (blocks.edges[view.shear.axes[2]] + 2 * (view.reach[2] + view.margin)).min(view.count[2])
+    (blocks.edges[view.shear.axes[2]] + 2 * (view.reach[2] + view.margin[2])).min(view.count[2])
 }
 
 /// Bytes of a batch of `frames` frames without decoded blocks.
@@ -114,7 +114,7 @@ impl<B: Blend> SlicePass<'_, B> {
             lap(&mut clock, &mut report.splat_seconds);
             progress.advance((ready.len() * self.view.parts() * units.len()) as u64);
         }
-        progress.advance(((self.view.all_slabs() - next) * self.view.parts() * units.len()) as u64);
+        progress.advance(((self.view.slab_count() - next) * self.view.parts() * units.len()) as u64);
         let swept = |frame: Frame<B>| SweptFrame { units: frame.units, groups: frame.groups };
         Ok(Swept { frames: frames.into_iter().map(swept).collect(), probe })
     }
@@ -174,6 +174,7 @@ impl<B: Blend> SlicePass<'_, B> {
         let limits: Vec<&[f32]> = frames.iter().map(|frame| frame.limits.as_slice()).collect();
         let need = |block: usize| (block, known.need(self.blend, &units[0], &limits, block));
         let needs: Vec<(usize, Need)> = blocks.touching(&region).map(need).collect();
+        let hidden: Vec<Vec<(Region, f64)>> = limits.iter().map(|limits| known.hidden::<B>(limits, &needs)).collect();
         let (read, others): (Vec<_>, Vec<_>) = needs.into_iter().partition(|(_, need)| *need == Need::Read);
         for (block, need) in others {
             let region = blocks.region(block);
@@ -196,7 +197,11 @@ impl<B: Blend> SlicePass<'_, B> {
             });
         })?;
         report.count_read(&stats);
-        frames.par_iter_mut().for_each(|frame| frame.layers.seal(view.count[0]));
+        frames.par_iter_mut().zip(hidden).for_each(|(frame, hidden)| {
+            let Frame { units, layers, .. } = frame;
+            hidden.iter().for_each(|(region, value)| layers.fill(view, region, units.number(*value)));
+            layers.seal(view.count[0]);
+        });
         Ok(())
     }
 
@@ -219,7 +224,7 @@ impl<B: Blend> SlicePass<'_, B> {
     }
 }
 
-/// The frames of a batch behind all slices, and rays that probe the first of them.
+/// The frames of a batch after all slices, and the rays that probe the first of them.
 pub(in crate::render) struct Swept<B: Blend> {
     frames: Vec<SweptFrame<B>>,
     probe: Option<Probe<B>>,

@@ -58,7 +58,9 @@ impl Blend for Composite {
     }
 
     fn table_error(&self) -> Option<f64> {
-        Some(self.table.error())
+        let of_table = |table: &Table| table.error().max(table.error_of_parts());
+        let of_slabs = self.slabs.as_ref().map_or(0.0, |slabs| of_table(&slabs.table));
+        Some(of_table(&self.table).max(of_slabs))
     }
 
     fn shows(&self, range: (f32, f32)) -> bool {
@@ -146,7 +148,8 @@ fn add(row: &Row<'_>, slices: &Slices<'_>, groups: RowGroups<'_, Cells>) {
             let (means, lengths) = row.means(n);
             (means, Some(lengths))
         };
-        if let (Some(steady), Some(last)) = (slices.steady, last.get_mut(n)) {
+        if let Some(steady) = slices.steady {
+            let (last, live) = (&mut last[n], &mut *live);
             let filled = if let Some(lengths) = &lengths { filled(&means, lengths) } else { means };
             *live = !is_steady(&filled, last, row, steady);
             if *live {
@@ -312,7 +315,7 @@ fn limit(group: &Cells, sum: &[f32; GROUP]) -> f32 {
     group.iter().flat_map(fourths).fold(0.0, f32::max)
 }
 
-/// The opacity of an extinction by a power of two, which is at least 0: 1 - 2^-power, to 2e-7.
+/// The opacity where light falls by a power of two: 1 - 2^-power for a power of at least 0, to 2e-7.
 #[inline(always)]
 fn opacity(power: f32) -> f32 {
     const WHOLE: f32 = 12_582_912.0;

@@ -35,8 +35,8 @@
 //! cells to pixels                 finish                           4 x 4 cells
 //! ```
 //!
-//! With sharp opacities, the part of the rays within a voxel is a slab of several slices. Where the values of a group of
-//! cells hardly change from slab to slab, one slice of the slab's thickness takes their place.
+//! With sharp opacities, slabs of at most a voxel have several slices. Where the values of a group of cells hardly change
+//! from slab to slab, one slice of the slab's thickness takes their place.
 //!
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.

@@ -3,7 +3,7 @@
 use super::row::Blend;
 use super::view::SlicedView;
 use crate::render::batches::{Selection, Units};
-use wavesplat_core::base::grid::BlockGrid;
+use wavesplat_core::base::grid::{BlockGrid, Region};
 
 /// Facts about the blocks of a batch, known before any block is read.
 pub(super) struct Known<'a> {
@@ -38,7 +38,7 @@ impl<'a> Known<'a> {
         selection.blocks.iter().for_each(|block| has_values[*block] = true);
         let mut wide = ranges.clone();
         for (i, axis) in view.shear.axes.into_iter().enumerate() {
-            widen(&mut wide, blocks, axis, (2 * (view.reach[i] + view.margin) - 1).div_ceil(blocks.edges[axis]));
+            widen(&mut wide, blocks, axis, (2 * (view.reach[i] + view.margin[i]) - 1).div_ceil(blocks.edges[axis]));
         }
         Self { view, blocks, ranges, wide, has_values }
     }
@@ -52,26 +52,44 @@ impl<'a> Known<'a> {
 
     /// What to do with a block. `limits` are those of all frames.
     pub(super) fn need<B: Blend>(&self, blend: &B, units: &Units, limits: &[&[f32]], block: usize) -> Need {
-        let (view, own, wide) = (self.view, self.ranges[block], self.wide[block]);
+        let (own, wide) = (self.ranges[block], self.wide[block]);
         if own.0 > own.1 {
             return Need::Missing;
         }
-        let any = own.0.max(f64::MIN).min(own.1);
+        let any = self.any(block);
         if !self.has_values[block] {
             return Need::Fill(0.0);
         }
         if !blend.shows((units.number(wide.0), units.number(wide.1))) {
             return Need::Fill(any);
         }
-        let [columns, rows] = view.reached(&self.blocks.region(block).intersect(&view.clip));
+        let open = limits.iter().any(|limits| self.is_open::<B>(limits, block));
+        if open { Need::Read } else { Need::Hidden(any) }
+    }
+
+    /// Whether an open cell of a frame needs a block.
+    fn is_open<B: Blend>(&self, limits: &[f32], block: usize) -> bool {
+        let view = self.view;
+        let [columns, mut rows] = view.reached(&self.blocks.region(block).intersect(&view.clip));
         let of_row = view.cells * view.cells;
         let width = view.extent[0] / super::GROUP;
-        let is_open = |limits: &[f32], row: usize| {
+        rows.any(|row| {
             let phase = |phase: usize| &limits[(row * of_row + phase) * width..][columns.clone()];
             (0..of_row).any(|n| phase(n).iter().any(|limit| !B::is_closed(*limit)))
-        };
-        let open = limits.iter().any(|limits| rows.clone().any(|row| is_open(limits, row)));
-        if open { Need::Read } else { Need::Hidden(any) }
+        })
+    }
+
+    /// The blocks that are read for other frames only, and the value that takes the place of their samples: so a frame is the same
+    /// in every batch.
+    pub(super) fn hidden<B: Blend>(&self, limits: &[f32], needs: &[(usize, Need)]) -> Vec<(Region, f64)> {
+        let read = needs.iter().filter(|(_, need)| *need == Need::Read).map(|(block, _)| *block);
+        let hidden = read.filter(|block| !self.is_open::<B>(limits, *block));
+        hidden.map(|block| (self.blocks.region(block), self.any(block))).collect()
+    }
+
+    /// Some value of a block's range.
+    fn any(&self, block: usize) -> f64 {
+        self.ranges[block].0.max(f64::MIN).min(self.ranges[block].1)
     }
 }
 

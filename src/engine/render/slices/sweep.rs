@@ -31,22 +31,22 @@ pub(super) struct Band<'a, B: Blend> {
 pub(super) struct SweepScratch {
     /// Zeros before and behind each row of sums along a.
     rim: usize,
-    /// AxisSums along a, and their derivatives along a.
+    /// Sums along a, and their derivatives along a.
     along_a: Vec<AxisSums>,
-    /// AxisSums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
+    /// Sums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
     along_b: Vec<Vec<AxisSums>>,
     /// For each group of the band, whether it is to be computed.
     live: Vec<bool>,
-    /// The bricks whose sums along a these need, and for each phase and row of bricks the groups whose sums along a and b they
-    /// need.
+    /// The bricks of which sums along a are needed.
     needed_along_a: Vec<bool>,
+    /// The groups of which sums along a and b are needed: for each phase, and each row of bricks.
     needed_along_b: Vec<Vec<bool>>,
 }
 
 impl SweepScratch {
     /// For a band of `rows` rows.
     pub(super) fn new(view: &SlicedView, rows: usize, is_shaded: bool) -> Self {
-        let (rim, band, rows) = (2 * view.reach[0] + GROUP, rows, Self::rows(view, rows));
+        let (rim, band, rows) = (Self::rim(view), rows, Self::rows(view, rows));
         let [of_a, of_b] = Self::kinds(is_shaded);
         let along_a = (0..of_a).map(|_| AxisSums::zeros(rows * Self::width(view, rim))).collect();
         let phase = |_| (0..of_b).map(|_| AxisSums::zeros(rows * view.extent[0])).collect();
@@ -61,6 +61,11 @@ impl SweepScratch {
         }
     }
 
+    /// Zeros that the groups farthest outside reach.
+    fn rim(view: &SlicedView) -> usize {
+        2 * view.reach[0] + GROUP + view.margin[0]
+    }
+
     /// The kinds of sums along a, and along a and b.
     fn kinds(is_shaded: bool) -> [usize; 2] {
         if is_shaded { [2, 3] } else { [1, 1] }
@@ -68,7 +73,7 @@ impl SweepScratch {
 
     /// The most rows of voxels, in whole bricks, that a band of `rows` rows needs.
     fn rows(view: &SlicedView, rows: usize) -> usize {
-        let reached = rows + 2 * (view.reach[1] + view.margin) + 1;
+        let reached = rows + 2 * (view.reach[1] + view.margin[1]) + 1;
         (reached + 2 * BRICK_ROWS).min(view.count[1]).next_multiple_of(BRICK_ROWS)
     }
 
@@ -79,7 +84,7 @@ impl SweepScratch {
     /// Bytes, if samples are missing.
     pub(super) fn bytes(view: &SlicedView, rows: usize, is_shaded: bool) -> usize {
         let [of_a, of_b] = Self::kinds(is_shaded);
-        let row = of_a * Self::width(view, 2 * view.reach[0] + GROUP) + of_b * view.cells * view.extent[0];
+        let row = of_a * Self::width(view, Self::rim(view)) + of_b * view.cells * view.extent[0];
         let live = rows * view.cells * view.cells * view.extent[0] / GROUP;
         2 * size_of::<f32>() * Self::rows(view, rows) * row + live
     }
@@ -96,13 +101,13 @@ struct Near {
 impl Near {
     fn new(view: &SlicedView, band: &Range<usize>, slice: &Slice, layers: &Layers) -> Self {
         let (first, met) = slice.along.within(0, view.count[2]);
-        let near = first.saturating_sub(view.margin)..(first + met.len() + view.margin).min(view.count[2]);
+        let near = first.saturating_sub(view.margin[2])..(first + met.len() + view.margin[2]).min(view.count[2]);
         let columns = layers.stride / GROUP;
         let ranges = Ranges::joint(near.map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
         let firsts = slice.across[1].iter().map(|taps| taps.first);
         let (least, most) = (firsts.clone().min().unwrap_or(0), firsts.max().unwrap_or(0));
         let reached = [band.start as i64, (band.end + 2 * view.reach[1]) as i64];
-        let rows = [least + reached[0] - view.margin as i64, most + reached[1] + view.margin as i64];
+        let rows = [least + reached[0] - view.margin[1] as i64, most + reached[1] + view.margin[1] as i64];
         let rows = rows.map(|row| row.clamp(0, layers.rows as i64) as usize);
         Self { bricks: rows[0] / BRICK_ROWS..rows[1].div_ceil(BRICK_ROWS), ranges }
     }
@@ -228,7 +233,7 @@ impl<B: Blend> Band<'_, B> {
         any
     }
 
-    /// AxisSums along a, for all bricks that are needed.
+    /// Sums along a, for all bricks that are needed.
     fn along_a(&mut self, part: &Part<'_>, near: &Near, layers: &Layers) {
         let (view, rim, columns) = (self.view, self.scratch.rim, near.ranges.columns);
         let stride = SweepScratch::width(view, rim);
@@ -255,7 +260,7 @@ impl<B: Blend> Band<'_, B> {
         }
     }
 
-    /// AxisSums along b of one phase, for all groups that are needed.
+    /// Sums along b of one phase, for all groups that are needed.
     fn along_b(&mut self, part: &Part<'_>, near: &Near, phase: usize) {
         let (view, rim, count) = (self.view, self.scratch.rim, self.view.extent[0] / GROUP);
         let taps = &part.slice.across[0][phase];
@@ -288,7 +293,7 @@ impl<B: Blend> Band<'_, B> {
         }
     }
 
-    /// AxisSums along c, and blends.
+    /// Sums along c, and blends.
     fn along_c(&mut self, part: &Part<'_>, near: &Near) {
         let view = self.view;
         let phases: Vec<Across> = part.slice.across[0].iter().map(|taps| Across::new(view, taps)).collect();
@@ -307,9 +312,11 @@ impl<B: Blend> Band<'_, B> {
                     let sums = &self.scratch.along_b[phase];
                     let row = Row { least: B::LEAST, stops, ..meets.row(view, part, near, sums, across) };
                     let next = row.slice + row.thickness;
-                    self.blend.add(&row, RowGroups { states, limits: &mut *limits, live, last });
-                    let over = limits.iter_mut().zip(stops).filter(|(_, stops)| are_over(stops, next));
-                    over.for_each(|(limit, _)| *limit = B::OVER);
+                    self.blend.add(&row, RowGroups { states, limits: &mut *limits, live: &mut *live, last });
+                    let is_slice = row.thickness == 1; // the slices of a slab that is not added are still to come
+                    for ((limit, stops), live) in limits.iter_mut().zip(stops).zip(live) {
+                        *limit = if (is_slice || !*live) && are_over(stops, next) { B::OVER } else { *limit };
+                    }
                 }
             }
         }
@@ -433,7 +440,7 @@ impl Visible {
             return;
         }
         let range = |first: i64, group: usize| {
-            let columns = columns_of(view, first, group, view.margin);
+            let columns = columns_of(view, first, group, view.margin[0]);
             Some(near.ranges.joined(bricks.clone(), columns)).filter(|range| shows(*range))
         };
         let of_phase = |first: i64| (0..view.extent[0] / GROUP).map(|group| range(first, group)).collect();
@@ -459,7 +466,7 @@ fn rows_of(brick: usize, rows: usize) -> (usize, usize) {
 
 /// The rows of bricks that decide what is visible in a row of cells.
 fn bricks_of(view: &SlicedView, taps: &Taps, row: usize) -> Range<usize> {
-    let (from, margin) = (taps.first + row as i64, view.margin as i64);
+    let (from, margin) = (taps.first + row as i64, view.margin[1] as i64);
     let ends = [from - margin, from + taps.weights.len() as i64 + margin];
     let [from, to] = ends.map(|row| row.clamp(0, view.count[1] as i64) as usize);
     if from < to { from / BRICK_ROWS..to.div_ceil(BRICK_ROWS) } else { 0..0 }

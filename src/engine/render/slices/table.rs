@@ -139,6 +139,15 @@ impl Table {
         std::array::from_fn(|i| self.entries[n][i] + rest * self.entries[n][4 + i])
     }
 
+    /// The same, from the colours and the extinction.
+    fn at_by_extinction(&self, number: f32) -> [f32; 4] {
+        let at = number.clamp(0.0, LAST as f32);
+        let (n, rest) = (at as usize, at.fract());
+        let [r, g, b, power] = std::array::from_fn(|i| self.colours[n][i] + rest * self.colours[n][4 + i]);
+        let opacity = 1.0 - (-power).exp2();
+        [r * opacity, g * opacity, b * opacity, -opacity]
+    }
+
     /// Whether a number from `lo` to `hi` has an opacity.
     pub(super) fn shows(&self, lo: f32, hi: f32) -> bool {
         if lo > hi {
@@ -158,8 +167,17 @@ impl Table {
 
     /// The largest error of a slice's light and opacity that the table makes, found at eight values per entry.
     pub(super) fn error(&self) -> f64 {
+        self.error_of(|number| self.at(number))
+    }
+
+    /// The same for slices of which rays pass a part.
+    pub(super) fn error_of_parts(&self) -> f64 {
+        self.error_of(|number| self.at_by_extinction(number))
+    }
+
+    fn error_of(&self, at: impl Fn(f32) -> [f32; 4]) -> f64 {
         let off = |value: f64| {
-            let (found, exact) = (self.at(self.units.number(value)), self.exact(value, 1.0));
+            let (found, exact) = (at(self.units.number(value)), self.exact(value, 1.0));
             found.iter().zip(exact).map(|(found, exact)| (f64::from(*found) - exact).abs()).fold(0.0, f64::max)
         };
         let values = (0..8 * ENTRIES).map(|n| self.units.zero + (n as f64 + 0.5) / (8.0 * self.units.per));
@@ -203,15 +221,16 @@ impl SlabTable {
     }
 }
 
-/// A slab counts as one slice if light and opacity are off by less than this: a fortieth of a level of an 8-bit picture.
-const SAME: f32 = 1e-4;
+/// A slab counts as one slice if light and opacity, without shading, are off by less than this. With ten times as much, shaded pictures
+/// are off by more than without slabs.
+const SAME: f32 = 1e-5;
 /// How much more a value may change within a slab than from the slab before.
 const CAUTION: f32 = 2.0;
 
 impl Table {
     /// The largest change from the slab before for which the light of a slab around a value is that of its slices.
     fn steady(&self, slices: &Self, parts: usize, value: f32) -> f32 {
-        let changes = (0..=2 * ENTRIES.ilog2()).map(|n| 0.5 * 2.0_f32.powf(n as f32 / 2.0));
+        let changes = (0..=4 * ENTRIES.ilog2()).map(|n| 0.5 * 2.0_f32.powf(n as f32 / 4.0));
         let is_same =
             |change: &f32| [-change, *change].iter().all(|change| self.off(slices, parts, value, *change) < SAME);
         changes.take_while(is_same).last().unwrap_or(0.0) / CAUTION
@@ -285,6 +304,8 @@ mod tests {
     #[test]
     fn the_error_of_the_table_is_that_of_its_steps() {
         assert!(Table::new(&grey(), 1.0).error() < 1e-4);
+        // The extinction rises steeply where almost nothing passes.
+        assert!(Table::new(&grey(), 1.0).error_of_parts() < 5e-4 && Table::new(&grey(), 0.5).error_of_parts() < 5e-3);
         for map in NAMES {
             let flat = TransferFunction::open(map).and_then(|map| map.over((3.0, 4.5))).expect("a map");
             let error = Table::new(&flat.with_opacity(&[(0.0, 0.1), (1.0, 0.1)]).expect("points"), 1.0).error();
@@ -302,7 +323,8 @@ mod tests {
             let map = TransferFunction::open("viridis").expect("a map").with_opacity(&points).expect("points");
             let slices = Table::new(&map, 0.9 / parts as f64);
             let slabs = SlabTable::new(&slices, parts);
-            let allowed = f64::from(SAME) + slabs.table.error() + parts as f64 * slices.error();
+            // A little more between the entries and changes that were tested.
+            let allowed = 1.2 * f64::from(SAME) + slabs.table.error() + parts as f64 * slices.error();
             let value = |number: f32| f64::from(number) / slices.units.per + slices.units.zero;
             for n in 0..20_000_u32 {
                 let number = (n.wrapping_mul(2_654_435_761) >> 8) as f32 / 30_000.0 - 20.0;
@@ -321,7 +343,7 @@ mod tests {
             }
             let [much, little] = [|most: &&f32| **most >= 1.0, |most: &&f32| **most < 0.5];
             let [much, little] = [slabs.steady.iter().filter(much).count(), slabs.steady.iter().filter(little).count()];
-            assert!(much > 50 && (parts == 2 || little > 50), "{points:?}: {much} {little}");
+            assert!(much > 15 && (parts == 2 || little > 50), "{points:?}: {much} {little}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures against brute force: the field of the kernels, sampled along the ray of every pixel at small steps.
 
-use crate::render::{FrameScene, Mode, RenderConfig, RenderReport, Rendered, Surface, render};
+use crate::render::{FrameScene, Mode, Plane, RenderConfig, RenderReport, Rendered, Surface, render};
 use lit::LAMP;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{Grid, Region};
@@ -88,6 +88,11 @@ impl Case {
 
     /// For each pixel, the density and the mean at every step along its ray, front to back.
     fn rays(&self, step: f64, least: f64) -> Vec<Vec<(f64, f64)>> {
+        self.rays_up_to(step, least, f64::INFINITY)
+    }
+
+    /// The same up to a depth.
+    fn rays_up_to(&self, step: f64, least: f64, end: f64) -> Vec<Vec<(f64, f64)>> {
         let camera = Camera::new(&self.view, &self.grid).expect("a view");
         let clip = self.region.unwrap_or(self.grid.whole());
         let voxels: Vec<([f64; 3], f64)> = clip
@@ -98,7 +103,8 @@ impl Case {
         let cell: f64 = self.grid.spacing.iter().product();
         let peak = cell / ((2.0 * std::f64::consts::PI).sqrt() * self.sigma).powi(3);
         let ends = voxels.iter().fold([f64::MAX, f64::MIN], |e, (p, _)| [e[0].min(p[2]), e[1].max(p[2])]);
-        let count = ((ends[1] - ends[0] + 8.0 * self.sigma) / step).ceil() as usize;
+        let behind = ends[1] + 4.0 * self.sigma;
+        let count = ((behind.min(end) - ends[0] + 4.0 * self.sigma) / step).round() as usize;
         let gauss = |off: f64| (-0.5 * (off / self.sigma).powi(2)).exp();
         let of_pixel = |pixel: usize| {
             let at = [pixel % self.view.size[0], pixel / self.view.size[0]].map(|n| n as f64 + 0.5);
@@ -123,6 +129,11 @@ impl Case {
     }
 
     fn light_of(&self, transfer: &TransferFunction) -> Vec<f64> {
+        self.light_up_to(transfer, f64::INFINITY)
+    }
+
+    /// The same in front of a depth.
+    fn light_up_to(&self, transfer: &TransferFunction, end: f64) -> Vec<f64> {
         let step = self.grid.spacing.iter().copied().fold(f64::MAX, f64::min) / 8.0;
         let unit = self.grid.largest_spacing();
         let pixel = |ray: &Vec<(f64, f64)>| {
@@ -135,7 +146,7 @@ impl Case {
             }
             [light[0], light[1], light[2], 1.0 - through]
         };
-        self.rays(step, 1e-6).iter().flat_map(pixel).collect()
+        self.rays_up_to(step, 1e-6, end).iter().flat_map(pixel).collect()
     }
 
     /// The largest value of every pixel; NaN without any.
@@ -210,11 +221,15 @@ fn composites_of_parts_holes_and_thin_volumes_are_those_of_brute_force() {
     }
 }
 
-/// Sharp opacities, for which slabs have eight slices; where the field changes little, these count as one.
+/// Sharp opacities, for which slabs have eight slices. Where the field changes little, these count as one.
+fn sharp() -> TransferFunction {
+    let points = [(0.0, 0.0), (0.3, 0.02), (0.4, 0.5), (0.5, 0.02), (0.7, 0.02), (0.75, 0.4), (1.0, 0.4)];
+    transfer().with_opacity(&points).expect("points")
+}
+
 #[test]
 fn composites_of_sharp_opacities_are_those_of_brute_force() {
-    let points = [(0.0, 0.0), (0.3, 0.02), (0.4, 0.5), (0.5, 0.02), (0.7, 0.02), (0.75, 0.4), (1.0, 0.4)];
-    let sharp = transfer().with_opacity(&points).expect("points");
+    let sharp = sharp();
     for view in views() {
         let name = format!("{} {} {}", view.azimuth, view.elevation, view.roll);
         let mut case = case([18, 15, 13], view);
@@ -222,6 +237,58 @@ fn composites_of_sharp_opacities_are_those_of_brute_force() {
         case.check_of(sharp.clone(), &name, 1.2e-3, 2.5e-2);
         case.values[1200..1500].fill(f64::NAN);
         case.check_of(sharp.clone(), &format!("{name}, holes"), 1.2e-3, 2.5e-2);
+    }
+}
+
+/// Slices of a slab move by several voxels if voxels are long along the ray.
+#[test]
+fn sharp_composites_of_very_long_voxels_are_those_of_brute_force() {
+    for view in [view(40.0, 0.0, 0.0), view(0.0, 46.0, 0.0), view(44.0, 44.0, 10.0)] {
+        for spacing in [[1.0, 1.0, 4.0], [5.0, 1.0, 1.0], [1.0, 3.0, 1.0]] {
+            let mut case = case([14, 13, 11], view);
+            case.values.iter_mut().for_each(|value| *value = 0.35 + 0.2 * *value);
+            (case.grid.spacing, case.sigma) = (spacing, 3.0);
+            case.check_of(sharp(), &format!("{spacing:?} {} {}", view.azimuth, view.elevation), 2e-3, 2.5e-2);
+        }
+    }
+}
+
+/// The plane shows the values in it, which are all the same.
+#[test]
+fn planes_end_the_rays_of_sharp_opacities() {
+    let mut case = case([18, 15, 13], View { size: [40, 36], ..View::new(0.0, 0.0) });
+    let camera = Camera::new(&case.view, &case.grid).expect("a view");
+    let depths: Vec<f64> = (0..3)
+        .map(|axis| {
+            let mut voxel = [0; 3];
+            voxel[axis] = 1;
+            camera.project(case.grid.position(voxel))[2] - camera.project(case.grid.position([0; 3]))[2]
+        })
+        .collect();
+    let axis = (0..3).max_by(|a, b| depths[*a].abs().total_cmp(&depths[*b].abs())).expect("three axes");
+    let voxels: Vec<[usize; 3]> = case.grid.whole().iter().collect();
+    case.values = voxels.iter().map(|voxel| 0.5 + 0.3 * (0.7 * voxel[axis] as f64).sin()).collect();
+    for at in [4.0, 5.0, 6.25, 7.5] {
+        let plane = Plane { axis, at };
+        let found = case.picture(Mode::Composite {
+            transfer: sharp(),
+            unit: None,
+            slices: None,
+            light: None,
+            planes: vec![plane],
+        });
+        let end = camera.project(case.grid.position([0; 3]))[2] + at * depths[axis];
+        let front = case.light_up_to(&sharp(), end);
+        let [from, to] = [at.floor(), at.ceil()].map(|n| 0.5 + 0.3 * (0.7 * n).sin());
+        let colour = sharp().colour(from + (to - from) * at.fract()).expect("a colour");
+        let inside = |pixel: &usize| (12..24).contains(&(pixel / 40)) && (14..26).contains(&(pixel % 40));
+        for pixel in (0..40 * 36).filter(inside) {
+            for c in 0..3 {
+                let expected = front[4 * pixel + c] + (1.0 - front[4 * pixel + 3]) * colour[c];
+                let off = (f64::from(found[4 * pixel + c]) - expected).abs();
+                assert!(off < 1e-2 && found[4 * pixel + 3] == 1.0, "{at} {pixel} {c}: {off:e}");
+            }
+        }
     }
 }
 
@@ -312,7 +379,11 @@ fn threads_change_no_bit_of_a_composite() {
         Mode::Composite { transfer: transfer(), unit: None, slices: None, light: Some(LAMP), planes: Vec::new() };
     let surface = Surface { value: 0.5, colour: [1.0; 3], opacity: 0.5 };
     let iso = Mode::Iso { surfaces: vec![surface], light: LAMP, slices: None };
-    for mode in [composite(None), Mode::Mip { slices: None }, shaded, iso] {
+    let steep = |light, planes| Mode::Composite { transfer: sharp(), unit: None, slices: None, light, planes };
+    let planes = vec![Plane { axis: 0, at: 20.0 }, Plane { axis: 2, at: 5.5 }];
+    let modes =
+        [composite(None), Mode::Mip { slices: None }, shaded, iso, steep(Some(LAMP), vec![]), steep(None, planes)];
+    for mode in modes {
         let by = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             let bits: Vec<u32> = pool.install(|| case.picture(mode.clone())).into_iter().map(f32::to_bits).collect();
@@ -320,4 +391,11 @@ fn threads_change_no_bit_of_a_composite() {
         };
         assert!(by(1) == by(2) && by(1) == by(5));
     }
+    let mut long = Case { view: View { size: [90, 400], ..view(20.0, 44.0, 0.0) }, ..case };
+    long.grid.spacing = [1.0, 1.0, 5.0];
+    let by = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| long.picture(steep(None, vec![]))).into_iter().map(f32::to_bits).collect::<Vec<_>>()
+    };
+    assert!(by(1) == by(5), "slices that move by several voxels");
 }

@@ -44,9 +44,9 @@ pub(in crate::render) struct SlicedView {
     /// Slabs per voxel along a, and slices per slab.
     slabs: usize,
     parts: usize,
-    /// Voxels beyond the kernel that decide whether a cell is visible: what is between two slices of a surface shows in
-    /// both, and what is in a slab counts for all its slices.
-    pub(super) margin: usize,
+    /// Voxels beyond the kernel, along b, c and a, that decide whether a cell is visible: what is between two slices of a surface
+    /// shows in both, and what a slab's slices meet counts for all of it.
+    pub(super) margin: [usize; 3],
     /// The lattice's first cell, in whole voxels.
     corner: [i64; 2],
     /// Width and height of the lattice in voxels; the width is a multiple of [`GROUP`].
@@ -59,8 +59,9 @@ pub(in crate::render) struct SlicedView {
 #[derive(Debug, Clone)]
 pub(super) struct Slice {
     pub(super) number: u32,
-    /// The number of slices in whose place it stands, and the mean of their densities as a share of its own.
+    /// The number of slices in whose place it stands.
     pub(super) thickness: u32,
+    /// The mean density of these slices as a share of its own.
     pub(super) filling: f64,
     /// Weights along a; voxels are counted from the first that a ray meets.
     pub(super) along: Taps,
@@ -71,7 +72,7 @@ pub(super) struct Slice {
 /// A part of all rays at most a voxel thick: a few slices, or one in place of them where light hardly changes.
 #[derive(Debug, Clone)]
 pub(super) struct Slab {
-    /// The slice in its middle, as thick as the slab.
+    /// The slice in its middle. If `is_met`, it is as thick as the slab.
     pub(super) middle: Slice,
     /// Its slices; none if the slab is one.
     pub(super) slices: Vec<Slice>,
@@ -151,13 +152,23 @@ impl SlicedView {
             cells,
             slabs,
             parts,
-            margin: usize::from(config.mode.is_of_surfaces() || parts > 1),
+            margin: [usize::from(config.mode.is_of_surfaces()); 3],
             corner: [0; 2],
             extent: [0; 2],
             step,
         };
+        if parts > 1 {
+            cut.margin = cut.margin_of_slabs();
+        }
         (cut.corner, cut.extent) = cut.lattice();
         if cut.extent.iter().any(|n| *n > MOST_EXTENT) { Err(too_wide()) } else { Ok(cut) }
+    }
+
+    /// The most voxels that a slab's slices move from its middle.
+    fn margin_of_slabs(&self) -> [usize; 3] {
+        let farthest = (self.parts - 1) as f64 / (2 * self.parts * self.slabs) as f64;
+        let [b, c] = self.shear.slopes.map(|slope| (slope.abs() * farthest).ceil() as usize);
+        [b, c, 0] // all slices of a slab lie between the same two layers
     }
 
     /// The part of the lattice that both the picture and the kernels of the region reach.
@@ -223,11 +234,11 @@ impl SlicedView {
 
     /// Number of slices.
     pub(in crate::render) fn slices(&self) -> usize {
-        self.all_slabs() * self.parts
+        self.slab_count() * self.parts
     }
 
     /// Number of slabs.
-    pub(super) fn all_slabs(&self) -> usize {
+    pub(super) fn slab_count(&self) -> usize {
         (self.count[2] - 1 + 2 * self.reach[2]) * self.slabs
     }
 
@@ -241,16 +252,16 @@ impl SlicedView {
         self.parts
     }
 
-    /// The position of the middle of a slice, or of a slab if `slabs` are that many per voxel: in voxels from the first that a ray meets.
+    /// The position along a of one of `per_voxel` slices or slabs per voxel, in voxels from the first that a ray meets.
     fn position(&self, number: usize, per_voxel: usize) -> f64 {
         (number as f64 + 0.5) / per_voxel as f64 - self.reach[2] as f64
     }
 
     /// The slabs that need no voxel from `met` on, of all from `first` on: a range of numbers.
     pub(super) fn ready(&self, first: usize, met: usize) -> Range<usize> {
-        let beyond = (self.reach[2] + self.margin) as i64;
+        let beyond = (self.reach[2] + self.margin[2]) as i64;
         let needs = |number: &usize| self.position(*number, self.slabs).floor() as i64 + beyond;
-        let all = self.all_slabs();
+        let all = self.slab_count();
         if met >= self.count[2] {
             return first..all;
         }
@@ -259,7 +270,7 @@ impl SlicedView {
 
     /// The first voxel along a, counted along the ray, that slabs from `number` on need.
     pub(super) fn first_needed(&self, number: usize) -> usize {
-        let beyond = (self.reach[2] + self.margin) as i64;
+        let beyond = (self.reach[2] + self.margin[2]) as i64;
         (self.position(number, self.slabs).floor() as i64 + 1 - beyond).clamp(0, self.count[2] as i64) as usize
     }
 

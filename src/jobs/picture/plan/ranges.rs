@@ -43,7 +43,7 @@ const MEMORY_SHARE: usize = 32;
 /// The largest number of samples of a distribution.
 const MOST_OF_DISTRIBUTION: usize = 1 << 20;
 
-/// An overview of a few frames, as [`Scene::overview`] gives it.
+/// An overview of a few frames of one channel, as [`Scene::overview`] gives it.
 pub(in crate::picture) struct Overview {
     stride: usize,
     frames: Vec<usize>,
@@ -51,7 +51,7 @@ pub(in crate::picture) struct Overview {
 }
 
 impl Overview {
-    /// The samples of some of its frames, if it has them with this stride, in one channel.
+    /// The samples of some of its frames, if it has them with this stride.
     fn of_frames(&self, stride: usize, frames: &[usize]) -> Option<Vec<f32>> {
         let of_frame = self.samples.len() / self.frames.len().max(1);
         let place = |frame: &usize| self.frames.binary_search(frame).ok();
@@ -61,8 +61,8 @@ impl Overview {
     }
 }
 
-/// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview. `held` may be an overview
-/// of these samples.
+/// How samples are distributed, in an overview of a few frames; `None` if the scene has no overview. If an overview
+/// is `held` that has these samples, they are taken from it.
 pub(in crate::picture) fn distribution(
     scene: &mut dyn Scene,
     config: &RenderConfig,
@@ -311,7 +311,7 @@ impl Ranges {
             match values_of_overview(scene, &rough, reporter)? {
                 Some((values, overview)) => {
                     ranges.set_values(values);
-                    ranges.overview = Some(overview);
+                    ranges.overview = Some(overview).filter(|_| scene.channels() == 1);
                 }
                 None => ranges.set_values(values_of_frames(scene, &rough, reporter)?),
             }
