@@ -2,7 +2,7 @@
 
 use crate::common::views::{archive, field, of_reference, view};
 use crate::common::{Stored, direct, looking, pictures, settings, stored};
-use crate::frame_pictures::under_less_memory;
+use crate::frame_pictures::{bits, under_less_memory};
 use crate::reference::ray::Rays;
 use wavesplat::base::error::Error;
 use wavesplat::base::grid::{Grid, Region};
@@ -231,6 +231,31 @@ fn memory_changes_no_bit_of_a_composite() {
     ] {
         let config = RenderConfig { splat_error, region, ..seen(view(30.0, 25.0, [100, 90]), &GRID, mode) };
         files.iter().for_each(|file| assert!(under_less_memory(&mut scene(file), &config) >= 3));
+    }
+}
+
+/// Blocks behind a wall are hidden in some frames, and read for others: the wall moves.
+#[test]
+fn a_frame_is_the_same_alone_and_among_others() {
+    let grid = Grid::unit([40, 64, 40]);
+    let value = |[x, y, z]: [usize; 3], t: usize| match 54 - y.min(54) {
+        0..12 => -1.0,
+        depth if (12 + 4 * t..20 + 4 * t).contains(&depth) => 3.9 + 0.1 * ((x + z + t) as f64).sin(),
+        depth if depth < 12 + 4 * t => -1.0,
+        _ => 1.5 + 1.5 * (0.3 * (x + y + z + t) as f64).sin(),
+    };
+    let frame = |t: usize| grid.whole().iter().map(move |voxel| value(voxel, t)).collect::<Vec<_>>();
+    let memory = archive(grid, SampleType::F32, &(0..FRAMES).flat_map(frame).collect::<Vec<_>>());
+    let file = stored(&mut memory.clone(), &ConvertConfig { block: Some(5), ..settings(Basis::Haar, 8, 0.0) });
+    let close = View { scale: Some(6.0), ..view(0.0, 0.0, [96, 96]) };
+    let config = seen(close, &grid, composite(None));
+    let mut scene = scene(&file);
+    let (all, report) = pictures(&mut scene, &config);
+    assert!(report.blocks_hidden > report.blocks / 20, "{report:?}");
+    for (frame, expected) in all.chunks_exact(all.len() / FRAMES).enumerate() {
+        let (alone, report) = pictures(&mut scene, &RenderConfig { frames: vec![frame], ..config.clone() });
+        assert!(bits(&alone) == bits(expected), "{frame}");
+        assert!(report.blocks_hidden > 0, "{frame}");
     }
 }
 

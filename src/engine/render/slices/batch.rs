@@ -180,8 +180,7 @@ impl<B: Blend> SlicePass<'_, B> {
             let region = blocks.region(block);
             match need {
                 Need::Read => {}
-                Need::Missing => report.blocks_transparent += 1,
-                Need::Fill(_) => report.blocks_transparent += 1,
+                Need::Missing | Need::Fill(_) => report.blocks_transparent += 1,
                 Need::Hidden(_) => report.blocks_hidden += 1,
             }
             let fill = |units: &Units| match need {
@@ -211,6 +210,7 @@ impl<B: Blend> SlicePass<'_, B> {
         let (rows, of_row) = (rows_of_band(view), view.cells * view.cells * view.extent[0] / GROUP);
         let size = rows * of_row;
         let mut last: Vec<&mut [LastMeans]> = frame.last.chunks_mut(size).collect();
+        // None for any band if every slab is one slice.
         last.resize_with(frame.groups.len().div_ceil(size), Default::default);
         let chunks = frame.groups.par_chunks_mut(size).zip(frame.limits.par_chunks_mut(size));
         chunks.zip(last).enumerate().for_each(|(n, ((groups, limits), last))| {

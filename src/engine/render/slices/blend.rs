@@ -149,9 +149,7 @@ fn add(row: &Row<'_>, slices: &Slices<'_>, groups: RowGroups<'_, Cells>) {
             (means, Some(lengths))
         };
         if let Some(steady) = slices.steady {
-            let (last, live) = (&mut last[n], &mut *live);
-            let filled = if let Some(lengths) = &lengths { filled(&means, lengths) } else { means };
-            *live = !is_steady(&filled, last, row, steady);
+            *live = !is_steady(&filled(&means, lengths.as_ref()), &mut last[n], row, steady);
             if *live {
                 continue;
             }
@@ -170,7 +168,8 @@ fn add(row: &Row<'_>, slices: &Slices<'_>, groups: RowGroups<'_, Cells>) {
 
 /// The means, with that of a cell beside it for a cell that has none.
 #[inline(always)]
-fn filled(means: &Sixteen, lengths: &Sixteen) -> Sixteen {
+fn filled(means: &Sixteen, lengths: Option<&Sixteen>) -> Sixteen {
+    let Some(lengths) = lengths else { return *means };
     let first = lengths.iter().position(|length| *length > 0.0).unwrap_or(0);
     let (mut filled, mut near) = (*means, means[first]);
     for i in 0..GROUP {

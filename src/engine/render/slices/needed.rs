@@ -79,8 +79,8 @@ impl<'a> Known<'a> {
         })
     }
 
-    /// The blocks that are read for other frames only, and the value that takes the place of their samples: so a frame is the same
-    /// in every batch.
+    /// The blocks that are read for other frames of the batch but hidden in this one, and the value that takes the place of their
+    /// samples. So a frame is the same in every batch.
     pub(super) fn hidden<B: Blend>(&self, limits: &[f32], needs: &[(usize, Need)]) -> Vec<(Region, f64)> {
         let read = needs.iter().filter(|(_, need)| *need == Need::Read).map(|(block, _)| *block);
         let hidden = read.filter(|block| !self.is_open::<B>(limits, *block));

@@ -29,9 +29,7 @@ pub(super) struct Band<'a, B: Blend> {
 
 /// The sums of the slice in work. The derivatives are those that the gradient needs, if the blend is shaded.
 pub(super) struct SweepScratch {
-    /// Zeros before and behind each row of sums along a.
-    rim: usize,
-    /// Sums along a, and their derivatives along a.
+    /// Sums along a, and their derivatives along a; each row with a rim of zeros.
     along_a: Vec<AxisSums>,
     /// Sums along a and b, for each phase along b: plain ones, and the derivatives along b and a.
     along_b: Vec<Vec<AxisSums>>,
@@ -44,26 +42,25 @@ pub(super) struct SweepScratch {
 }
 
 impl SweepScratch {
-    /// For a band of `rows` rows.
-    pub(super) fn new(view: &SlicedView, rows: usize, is_shaded: bool) -> Self {
-        let (rim, band, rows) = (Self::rim(view), rows, Self::rows(view, rows));
-        let [of_a, of_b] = Self::kinds(is_shaded);
-        let along_a = (0..of_a).map(|_| AxisSums::zeros(rows * Self::width(view, rim))).collect();
+    /// For a band of `band_rows` rows.
+    pub(super) fn new(view: &SlicedView, band_rows: usize, is_shaded: bool) -> Self {
+        let ([of_a, of_b], rows) = (Self::kinds(is_shaded), Self::rows(view, band_rows));
+        let along_a = (0..of_a).map(|_| AxisSums::zeros(rows * Self::width(view))).collect();
         let phase = |_| (0..of_b).map(|_| AxisSums::zeros(rows * view.extent[0])).collect();
         let (bricks, groups) = (rows.div_ceil(BRICK_ROWS), view.extent[0] / GROUP);
         Self {
-            rim,
             along_a,
             along_b: (0..view.cells).map(phase).collect(),
-            live: vec![false; band * view.cells * view.cells * groups],
+            live: vec![false; band_rows * view.cells * view.cells * groups],
             needed_along_a: vec![false; bricks * view.count[0].div_ceil(GROUP)],
             needed_along_b: vec![vec![false; bricks * groups]; view.cells],
         }
     }
 
-    /// Zeros that the groups farthest outside reach.
+    /// Zeros before and behind each row of sums along a. A group is live if its cells in the middle of a slab are within the margin
+    /// of voxels; those in a slice may be farther away by as much.
     fn rim(view: &SlicedView) -> usize {
-        2 * view.reach[0] + GROUP + view.margin[0]
+        2 * (view.reach[0] + view.margin[0]) + GROUP
     }
 
     /// The kinds of sums along a, and along a and b.
@@ -77,14 +74,14 @@ impl SweepScratch {
         (reached + 2 * BRICK_ROWS).min(view.count[1]).next_multiple_of(BRICK_ROWS)
     }
 
-    fn width(view: &SlicedView, rim: usize) -> usize {
-        view.count[0].next_multiple_of(GROUP) + 2 * rim
+    fn width(view: &SlicedView) -> usize {
+        view.count[0].next_multiple_of(GROUP) + 2 * Self::rim(view)
     }
 
     /// Bytes, if samples are missing.
     pub(super) fn bytes(view: &SlicedView, rows: usize, is_shaded: bool) -> usize {
         let [of_a, of_b] = Self::kinds(is_shaded);
-        let row = of_a * Self::width(view, Self::rim(view)) + of_b * view.cells * view.extent[0];
+        let row = of_a * Self::width(view) + of_b * view.cells * view.extent[0];
         let live = rows * view.cells * view.cells * view.extent[0] / GROUP;
         2 * size_of::<f32>() * Self::rows(view, rows) * row + live
     }
@@ -99,12 +96,12 @@ struct Near {
 }
 
 impl Near {
-    fn new(view: &SlicedView, band: &Range<usize>, slice: &Slice, layers: &Layers) -> Self {
-        let (first, met) = slice.along.within(0, view.count[2]);
-        let near = first.saturating_sub(view.margin[2])..(first + met.len() + view.margin[2]).min(view.count[2]);
+    fn new(view: &SlicedView, band: &Range<usize>, middle: &Slice, layers: &Layers) -> Self {
+        let (first, met) = middle.along.within(0, view.count[2]);
+        let met = first.saturating_sub(view.margin[2])..(first + met.len() + view.margin[2]).min(view.count[2]);
         let columns = layers.stride / GROUP;
-        let ranges = Ranges::joint(near.map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
-        let firsts = slice.across[1].iter().map(|taps| taps.first);
+        let ranges = Ranges::joint(met.map(|layer| layers.ranges(layer)), columns, layers.rows.div_ceil(BRICK_ROWS));
+        let firsts = middle.across[1].iter().map(|taps| taps.first);
         let (least, most) = (firsts.clone().min().unwrap_or(0), firsts.max().unwrap_or(0));
         let reached = [band.start as i64, (band.end + 2 * view.reach[1]) as i64];
         let rows = [least + reached[0] - view.margin[1] as i64, most + reached[1] + view.margin[1] as i64];
@@ -151,6 +148,13 @@ impl<B: Blend> Band<'_, B> {
     /// Adds a slab behind the earlier ones: as one slice the groups whose light hardly changes within it, then the
     /// others slice by slice.
     pub(super) fn add(&mut self, slab: &Slab, layers: &Layers) {
+        self.add_visible(slab, layers);
+        let next = slab.middle.number + self.view.parts() as u32;
+        let ended = self.limits.iter_mut().zip(self.stops).filter(|(_, stops)| are_over(stops, next));
+        ended.for_each(|(limit, _)| *limit = B::OVER);
+    }
+
+    fn add_visible(&mut self, slab: &Slab, layers: &Layers) {
         let near = Near::new(self.view, &self.rows, &slab.middle, layers);
         let all = near.ranges.joined(near.bricks.clone(), 0..near.ranges.columns);
         if !self.blend.shows(all) || !self.find_live(&near, &slab.middle) {
@@ -189,7 +193,7 @@ impl<B: Blend> Band<'_, B> {
         let (mut visible, mut any) = (vec![Visible::default(); view.cells], false);
         for row in self.rows.clone() {
             for (down, taps) in middle.across[1].iter().enumerate() {
-                let bricks = bricks_of(view, taps, row);
+                let bricks = bricks_of(view, taps, row, view.margin[1]);
                 visible[down].update(view, near, middle, bricks, |range| self.blend.shows(range));
                 for phase in 0..view.cells {
                     let groups = self.groups_at(row, down, phase);
@@ -203,14 +207,13 @@ impl<B: Blend> Band<'_, B> {
 
     /// Marks the bricks and groups of sums that the live groups of a slice need. Returns whether there are any.
     fn find_needed(&mut self, slice: &Slice, near: &Near) -> bool {
-        let (view, count) = (self.view, self.view.extent[0] / GROUP);
+        let view = self.view;
         self.scratch.needed_along_a.fill(false);
         self.scratch.needed_along_b.iter_mut().for_each(|needed| needed.fill(false));
         for row in self.rows.clone() {
             for (down, taps) in slice.across[1].iter().enumerate() {
-                let (first, met) = taps.within(row as i64, view.count[1]);
-                let bricks = first / BRICK_ROWS..(first + met.len()).div_ceil(BRICK_ROWS);
-                for phase in (0..view.cells).filter(|_| !met.is_empty()) {
+                let bricks = bricks_of(view, taps, row, 0);
+                for phase in 0..view.cells {
                     let live = &self.scratch.live[self.groups_at(row, down, phase)];
                     for brick in bricks.clone() {
                         let needed = &mut self.scratch.needed_along_b[phase];
@@ -220,7 +223,12 @@ impl<B: Blend> Band<'_, B> {
                 }
             }
         }
-        let (columns, mut any) = (near.ranges.columns, false);
+        self.find_needed_along_a(slice, near.ranges.columns)
+    }
+
+    /// Marks the bricks of sums along a that those along b need. Returns whether there are any of these.
+    fn find_needed_along_a(&mut self, slice: &Slice, columns: usize) -> bool {
+        let (view, count, mut any) = (self.view, self.view.extent[0] / GROUP, false);
         for (taps, needed) in slice.across[0].iter().zip(&self.scratch.needed_along_b) {
             let bricks = self.scratch.needed_along_a.chunks_exact_mut(columns.max(1));
             for (bricks, needed) in bricks.zip(needed.chunks_exact(count)) {
@@ -235,8 +243,8 @@ impl<B: Blend> Band<'_, B> {
 
     /// Sums along a, for all bricks that are needed.
     fn along_a(&mut self, part: &Part<'_>, near: &Near, layers: &Layers) {
-        let (view, rim, columns) = (self.view, self.scratch.rim, near.ranges.columns);
-        let stride = SweepScratch::width(view, rim);
+        let (view, columns) = (self.view, near.ranges.columns);
+        let (rim, stride) = (SweepScratch::rim(view), SweepScratch::width(view));
         if part.has_missing {
             self.scratch.along_a.iter_mut().for_each(AxisSums::with_present);
         }
@@ -262,9 +270,9 @@ impl<B: Blend> Band<'_, B> {
 
     /// Sums along b of one phase, for all groups that are needed.
     fn along_b(&mut self, part: &Part<'_>, near: &Near, phase: usize) {
-        let (view, rim, count) = (self.view, self.scratch.rim, self.view.extent[0] / GROUP);
+        let (view, rim, count) = (self.view, SweepScratch::rim(self.view), self.view.extent[0] / GROUP);
         let taps = &part.slice.across[0][phase];
-        let (from, to) = (SweepScratch::width(view, rim), view.extent[0]);
+        let (from, to) = (SweepScratch::width(view), view.extent[0]);
         let sums = &mut self.scratch.along_b[phase];
         if part.has_missing {
             sums.iter_mut().for_each(AxisSums::with_present);
@@ -311,12 +319,7 @@ impl<B: Blend> Band<'_, B> {
                     let last = self.last.get_mut(groups).unwrap_or_default();
                     let sums = &self.scratch.along_b[phase];
                     let row = Row { least: B::LEAST, stops, ..meets.row(view, part, near, sums, across) };
-                    let next = row.slice + row.thickness;
-                    self.blend.add(&row, RowGroups { states, limits: &mut *limits, live: &mut *live, last });
-                    let is_slice = row.thickness == 1; // the slices of a slab that is not added are still to come
-                    for ((limit, stops), live) in limits.iter_mut().zip(stops).zip(live) {
-                        *limit = if (is_slice || !*live) && are_over(stops, next) { B::OVER } else { *limit };
-                    }
+                    self.blend.add(&row, RowGroups { states, limits, live, last });
                 }
             }
         }
@@ -464,9 +467,9 @@ fn rows_of(brick: usize, rows: usize) -> (usize, usize) {
     (brick * BRICK_ROWS, BRICK_ROWS.min(rows - brick * BRICK_ROWS))
 }
 
-/// The rows of bricks that decide what is visible in a row of cells.
-fn bricks_of(view: &SlicedView, taps: &Taps, row: usize) -> Range<usize> {
-    let (from, margin) = (taps.first + row as i64, view.margin[1] as i64);
+/// The rows of bricks within `margin` voxels of those that a row of cells needs.
+fn bricks_of(view: &SlicedView, taps: &Taps, row: usize, margin: usize) -> Range<usize> {
+    let (from, margin) = (taps.first + row as i64, margin as i64);
     let ends = [from - margin, from + taps.weights.len() as i64 + margin];
     let [from, to] = ends.map(|row| row.clamp(0, view.count[1] as i64) as usize);
     if from < to { from / BRICK_ROWS..to.div_ceil(BRICK_ROWS) } else { 0..0 }

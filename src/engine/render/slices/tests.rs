@@ -1,5 +1,6 @@
 //! Pictures against brute force: the field of the kernels, sampled along the ray of every pixel at small steps.
 
+use super::view::SlicedView;
 use crate::render::{FrameScene, Mode, Plane, RenderConfig, RenderReport, Rendered, Surface, render};
 use lit::LAMP;
 use wavesplat_core::base::error::Result;
@@ -54,6 +55,10 @@ fn transfer() -> TransferFunction {
 
 fn composite(slices: Option<usize>) -> Mode {
     Mode::Composite { transfer: transfer(), unit: None, slices, light: None, planes: Vec::new() }
+}
+
+fn composite_of(transfer: TransferFunction) -> Mode {
+    Mode::Composite { transfer, unit: None, slices: None, light: None, planes: Vec::new() }
 }
 
 impl Case {
@@ -162,8 +167,7 @@ impl Case {
 
     fn check_of(&self, transfer: TransferFunction, name: &str, rms: f64, most: f64) {
         let expected = self.light_of(&transfer);
-        let found =
-            self.picture(Mode::Composite { transfer, unit: None, slices: None, light: None, planes: Vec::new() });
+        let found = self.picture(composite_of(transfer));
         let off: Vec<f64> = found.iter().zip(&expected).map(|(f, e)| (f64::from(*f) - e).abs()).collect();
         assert!(expected.iter().any(|e| *e > 0.2) && found.len() == expected.len());
         let (found_rms, largest) = errors(&off);
@@ -240,16 +244,20 @@ fn composites_of_sharp_opacities_are_those_of_brute_force() {
     }
 }
 
-/// Slices of a slab move by several voxels if voxels are long along the ray.
 #[test]
-fn sharp_composites_of_very_long_voxels_are_those_of_brute_force() {
+fn sharp_composites_of_long_voxels_are_those_of_brute_force() {
+    let check = |mut case: Case, name: &str| {
+        case.values.iter_mut().for_each(|value| *value = 0.35 + 0.2 * *value);
+        case.check_of(sharp(), &format!("{name} {} {}", case.view.azimuth, case.view.elevation), 2e-3, 2.5e-2);
+    };
     for view in [view(40.0, 0.0, 0.0), view(0.0, 46.0, 0.0), view(44.0, 44.0, 10.0)] {
         for spacing in [[1.0, 1.0, 4.0], [5.0, 1.0, 1.0], [1.0, 3.0, 1.0]] {
-            let mut case = case([14, 13, 11], view);
-            case.values.iter_mut().for_each(|value| *value = 0.35 + 0.2 * *value);
-            (case.grid.spacing, case.sigma) = (spacing, 3.0);
-            case.check_of(sharp(), &format!("{spacing:?} {} {}", view.azimuth, view.elevation), 2e-3, 2.5e-2);
+            let case = case([14, 13, 11], view);
+            check(Case { grid: Grid { spacing, ..case.grid }, sigma: 3.0, ..case }, &format!("{spacing:?}"));
         }
+    }
+    for view in [view(20.0, 46.0, 0.0), view(130.0, 50.0, 15.0)] {
+        check(very_long(case([26, 23, 4], view), View { size: [20, 18], ..view }), "very long");
     }
 }
 
@@ -310,8 +318,7 @@ fn offsets_of_a_million_change_nothing_but_the_last_digits() {
     let plain = case.picture(composite(None));
     let far = Case { values: case.values.iter().map(|v| v + 1e6).collect(), ..case.clone() };
     let over = transfer().over((1e6 + 0.1, 1e6 + 1.0)).expect("a range");
-    let moved =
-        far.picture(Mode::Composite { transfer: over, unit: None, slices: None, light: None, planes: Vec::new() });
+    let moved = far.picture(composite_of(over));
     let off: Vec<f64> = plain.iter().zip(&moved).map(|(a, b)| f64::from((a - b).abs())).collect();
     assert!(errors(&off).1 < 1e-5, "{:?}", errors(&off));
     let [near, far] = [&case, &far].map(|case| case.picture(Mode::Mip { slices: None }));
@@ -365,8 +372,7 @@ fn probed_rays_tell_the_errors_of_the_picture() {
 fn report_of_a_step() -> f64 {
     let case = case([5, 4, 3], view(30.0, 25.0, 0.0));
     let step = transfer().with_opacity(&[(0.5, 0.0), (0.5001, 1.0)]).expect("points");
-    let (_, report) =
-        case.rendered(Mode::Composite { transfer: step, unit: None, slices: None, light: None, planes: Vec::new() });
+    let (_, report) = case.rendered(composite_of(step));
     report.views[0].table_error.expect("a table")
 }
 
@@ -384,18 +390,24 @@ fn threads_change_no_bit_of_a_composite() {
     let modes =
         [composite(None), Mode::Mip { slices: None }, shaded, iso, steep(Some(LAMP), vec![]), steep(None, planes)];
     for mode in modes {
-        let by = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let bits: Vec<u32> = pool.install(|| case.picture(mode.clone())).into_iter().map(f32::to_bits).collect();
-            bits
-        };
-        assert!(by(1) == by(2) && by(1) == by(5));
+        let one = bits(&case, &mode, 1);
+        assert!(one == bits(&case, &mode, 2) && one == bits(&case, &mode, 5));
     }
-    let mut long = Case { view: View { size: [90, 400], ..view(20.0, 44.0, 0.0) }, ..case };
-    long.grid.spacing = [1.0, 1.0, 5.0];
-    let by = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| long.picture(steep(None, vec![]))).into_iter().map(f32::to_bits).collect::<Vec<_>>()
-    };
-    assert!(by(1) == by(5), "slices that move by several voxels");
+    let long = very_long(case, View { size: [90, 400], ..view(20.0, 44.0, 0.0) });
+    let mode = steep(None, vec![]);
+    assert!(bits(&long, &mode, 1) == bits(&long, &mode, 5), "slices that move by several voxels");
+}
+
+fn bits(case: &Case, mode: &Mode, threads: usize) -> Vec<u32> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| case.picture(mode.clone())).into_iter().map(f32::to_bits).collect()
+}
+
+/// The same voxels, so long along z that the slices of a slab move by several voxels from its middle.
+fn very_long(case: Case, view: View) -> Case {
+    let grid = Grid { spacing: [1.0, 1.0, 12.0], ..case.grid };
+    let case = Case { grid, view, sigma: 9.0, ..case };
+    let sliced = SlicedView::new(&grid, &case.config(&case.scene(), composite_of(sharp())), &view).expect("a view");
+    assert!(sliced.has_parts() && sliced.margin.iter().any(|margin| *margin >= 3), "{:?}", sliced.margin);
+    case
 }

@@ -152,23 +152,24 @@ impl SlicedView {
             cells,
             slabs,
             parts,
-            margin: [usize::from(config.mode.is_of_surfaces()); 3],
+            margin: [0; 3],
             corner: [0; 2],
             extent: [0; 2],
             step,
         };
-        if parts > 1 {
-            cut.margin = cut.margin_of_slabs();
-        }
+        cut.margin = cut.margin(config.mode.is_of_surfaces());
         (cut.corner, cut.extent) = cut.lattice();
         if cut.extent.iter().any(|n| *n > MOST_EXTENT) { Err(too_wide()) } else { Ok(cut) }
     }
 
-    /// The most voxels that a slab's slices move from its middle.
-    fn margin_of_slabs(&self) -> [usize; 3] {
-        let farthest = (self.parts - 1) as f64 / (2 * self.parts * self.slabs) as f64;
-        let [b, c] = self.shear.slopes.map(|slope| (slope.abs() * farthest).ceil() as usize);
-        [b, c, 0] // all slices of a slab lie between the same two layers
+    /// See the field: as far as cells move from a slice to the next one, or from the middle of a slab to its slices.
+    fn margin(&self, is_of_surfaces: bool) -> [usize; 3] {
+        let slices = (self.slabs * self.parts) as f64;
+        let along_a = if is_of_surfaces { 1.0 / slices } else { (self.parts - 1) as f64 / (2.0 * slices) };
+        let least = usize::from(is_of_surfaces);
+        let moved = |slope: f64| (slope.abs() * along_a * (1.0 + 1e-9)).ceil() as usize;
+        let [b, c] = self.shear.slopes.map(|slope| moved(slope).max(least));
+        [b, c, least] // all slices of a slab lie between the same two layers
     }
 
     /// The part of the lattice that both the picture and the kernels of the region reach.
