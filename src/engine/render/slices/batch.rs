@@ -91,14 +91,14 @@ impl<B: Blend> SlicePass<'_, B> {
         let SampleReader { batch, blocks, progress, .. } = *self.reader;
         let known = Known::new(self.view, blocks, batch.selection());
         let (units, most) = (self.units(&known)?, most_layers(self.view, blocks));
-        let mut frames: Vec<Frame<B>> = units.iter().map(|units| Frame::new(self.view, most, *units)).collect();
+        let mut frames: Vec<Frame<B>> = units.par_iter().map(|units| Frame::new(self.view, most, *units)).collect();
         let mut probe = (report.views[self.number].probed.is_none() && self.stops.is_none())
             .then(|| Probe::new(self.view, self.blend));
         let mut next = 0;
         for layer in self.layers() {
             let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
             let mut clock = Instant::now();
-            frames.iter_mut().for_each(|frame| frame.layers.advance(self.view.first_needed(next), met));
+            frames.par_iter_mut().for_each(|frame| frame.layers.advance(self.view.first_needed(next), met));
             self.read(&known, layer, &mut frames, report)?;
             lap(&mut clock, &mut report.decode_seconds);
             let ready = self.view.ready(next, met);
