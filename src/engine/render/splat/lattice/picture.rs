@@ -12,7 +12,6 @@ use super::shear::Shear;
 use super::upright::{Move, Upright};
 use super::{Choice, Placed, Spreading, Sums};
 use crate::render::splat::tile_rect::{TILE, TileRect, WIDEST, pixels_around};
-use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_core::base::grid::{BlockGrid, Grid, Region};
@@ -289,10 +288,7 @@ impl Lattice {
         };
         let rows = rectangle.first[1]..rectangle.first[1] + rectangle.size[1] as isize;
         let window = Window { first: [u, rows.start], size: [width, rectangle.size[1]] };
-        FilteredCells::new(
-            cells,
-            &Filters { across: across.taps, along: rows.into_par_iter().map(of_row).collect(), window },
-        )
+        FilteredCells::new(cells, &Filters { across: across.taps, along: rows.map(of_row).collect(), window })
     }
 
     /// Width and height of a tile in pixels. A square of the height reaches at most [`TILE_CELLS`] cells. The pixels of a row
