@@ -128,7 +128,7 @@ pub struct ViewReport {
     pub slices: Option<usize>,
     /// Cells of a slice per voxel across the ray; `None` for projections.
     pub cells: Option<usize>,
-    /// The largest error that tabulating the transfer function makes in the light of one slice, if there is one.
+    /// The largest error that tabulating the transfer function makes in the light of one slice or a part of it, if there is one.
     pub table_error: Option<f64>,
     /// The errors of some pixels; `None` for projections, and if no ray of these meets the volume.
     pub probed: Option<Probed>,

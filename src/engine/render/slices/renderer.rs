@@ -29,6 +29,12 @@ struct ColouredPlanes<'a> {
     colours: &'a TransferFunction,
 }
 
+/// A batch of frames after all slices, and the values of the planes behind them.
+struct Drawn<B: Blend> {
+    swept: Swept<B>,
+    planes: Option<Vec<f32>>,
+}
+
 impl<'a, B: Blend> Sliced<'a, B> {
     pub(in crate::render) fn new(
         grid: &Grid,
@@ -65,9 +71,9 @@ impl<'a, B: Blend> Sliced<'a, B> {
             let stops = behind.as_ref().map(|behind| &behind.stops);
             let swept = SlicePass { number, view, blend: &blend, stops, reader }.sweep(report)?;
             let planes = behind.as_ref().map(|behind| PlanesPass { view: &behind.planes, reader }.pictures(report));
-            Ok((swept, planes.transpose()?))
+            Ok(Drawn { swept, planes: planes.transpose()? })
         };
-        let give = |frames: &[usize], (swept, planes): (Swept<B>, Option<Vec<f32>>), report: &mut RenderReport| {
+        let give = |frames: &[usize], Drawn { swept, planes }: Drawn<B>, report: &mut RenderReport| {
             swept.pictures(view, number, report, |n, picture| {
                 if let (Some(behind), Some(planes)) = (&behind, &planes) {
                     let each = planes.len() / frames.len();

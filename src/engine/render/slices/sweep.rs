@@ -35,9 +35,9 @@ pub(super) struct SweepScratch {
     along_b: Vec<Vec<AxisSums>>,
     /// For each group of the band, whether it is to be computed.
     live: Vec<bool>,
-    /// The bricks of which sums along a are needed.
+    /// Whether the sums along a of each brick are needed.
     needed_along_a: Vec<bool>,
-    /// The groups of which sums along a and b are needed: for each phase, and each row of bricks.
+    /// Whether the sums along a and b of each group are needed, for each phase and row of bricks.
     needed_along_b: Vec<Vec<bool>>,
 }
 

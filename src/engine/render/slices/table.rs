@@ -165,7 +165,7 @@ impl Table {
         self.error_of(1.0, |number| self.at(number))
     }
 
-    /// The same for slices of which rays pass a part, found at four shares.
+    /// The largest error for rays that cross only a part of a slice, found for four lengths.
     pub(super) fn error_of_parts(&self) -> f64 {
         let of_share = |share: f32| self.error_of(f64::from(share), |number| self.share_at(number, share));
         [1.0, 0.5, 0.25, 0.125].map(of_share).into_iter().fold(0.0, f64::max)

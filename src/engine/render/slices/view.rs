@@ -164,7 +164,7 @@ impl SlicedView {
 
     /// See the field: as far as cells move from a slice to the next one, or from the middle of a slab to its slices.
     fn margin(&self, is_of_surfaces: bool) -> [usize; 3] {
-        let slices = (self.slabs * self.parts) as f64;
+        let slices = self.slices_per_voxel() as f64;
         let along_a = if is_of_surfaces { 1.0 / slices } else { (self.parts - 1) as f64 / (2.0 * slices) };
         let least = usize::from(is_of_surfaces);
         let moved = |slope: f64| (slope.abs() * along_a * (1.0 + 1e-9)).ceil() as usize;
@@ -230,12 +230,16 @@ impl SlicedView {
     pub(super) fn slices_before(&self, at: f64) -> f64 {
         let last = (self.start[2] + self.count[2] - 1) as f64;
         let met = if self.reversed { last - at } else { at - self.start[2] as f64 };
-        (met + self.reach[2] as f64) * (self.slabs * self.parts) as f64
+        (met + self.reach[2] as f64) * self.slices_per_voxel() as f64
     }
 
     /// Number of slices.
     pub(in crate::render) fn slices(&self) -> usize {
         self.slab_count() * self.parts
+    }
+
+    fn slices_per_voxel(&self) -> usize {
+        self.slabs * self.parts
     }
 
     /// Number of slabs.
@@ -281,7 +285,7 @@ impl SlicedView {
         let is_met = |slice: &Slice| density(slice) as f32 >= LEAST;
         let first = number * self.parts;
         let mut middle = self.slice(self.position(number, self.slabs), first);
-        let part = |n: usize| self.slice(self.position(first + n, self.slabs * self.parts), first + n);
+        let part = |n: usize| self.slice(self.position(first + n, self.slices_per_voxel()), first + n);
         let parts = if self.has_parts() { 0..self.parts } else { 0..0 };
         let slices: Vec<Slice> = parts.map(part).filter(is_met).collect();
         let is_met = is_met(&middle);
@@ -311,7 +315,7 @@ impl SlicedView {
 
     /// The weights along b, c and a where the ray of a cell crosses a slice.
     pub(super) fn taps_at(&self, number: usize, cell: [f64; 2]) -> [Taps; 3] {
-        let position = self.position(number, self.slabs * self.parts);
+        let position = self.position(number, self.slices_per_voxel());
         let [b, c] = [0, 1].map(|i| self.taps(position, i, cell[i]));
         [b, c, Taps::new(position, self.sigma[2])]
     }
@@ -337,12 +341,12 @@ impl SlicedView {
 
     /// The distance of two slices, in voxels along a.
     pub(super) fn between(&self) -> f64 {
-        1.0 / (self.slabs * self.parts) as f64
+        1.0 / self.slices_per_voxel() as f64
     }
 
     /// The same view with `slices` slices per voxel, each a slab, and the number of slices of this view per slice of that one.
     pub(super) fn with_slices(&self, slices: usize) -> (Self, f64) {
-        (Self { slabs: slices, parts: 1, ..self.clone() }, (self.slabs * self.parts) as f64 / slices as f64)
+        (Self { slabs: slices, parts: 1, ..self.clone() }, self.slices_per_voxel() as f64 / slices as f64)
     }
 
     /// The place of voxel layer `at` (an index along the grid's axis a), counted along the ray.
