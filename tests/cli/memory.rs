@@ -95,6 +95,32 @@ fn pictures_take_what_they_plan() {
     }
 }
 
+/// Waves with a few single samples that stand out, in 96^3 voxels and 16 frames.
+fn write_waves(work: &Work, name: &str) {
+    let mut random = Random(3);
+    let mut sample = |t: usize, [x, y, z]: [usize; 3]| {
+        let [x, y, z, t] = [x, y, z, t].map(|n| n as f64);
+        let wave = (0.21 * x + 0.3 * t).sin() * (0.17 * y).cos() + (0.13 * z).sin();
+        (wave + if random.unit() < 0.002 { 0.3 } else { 0.0 }) as f32
+    };
+    let mut bytes = Vec::new();
+    for (t, z, y) in (0..16).flat_map(|t| (0..96).flat_map(move |z| (0..96).map(move |y| (t, z, y)))) {
+        (0..96).for_each(|x| bytes.extend(sample(t, [x, y, z]).to_le_bytes()));
+    }
+    work.write(name, bytes);
+}
+
+#[test]
+fn a_plan_knows_how_much_single_blocks_store() {
+    let work = Work::new();
+    write_waves(&work, "w.raw");
+    work.wavesplat("convert w.raw --dims 96x96x96x16 --dtype f32 --block 16 --tolerance 1e-2 -o w.wspl").ok();
+    let settings = "--size 96x96 --mode composite --opacity 0:0,1:0.3 --range=-2,2 --threads 2 --memory 24MiB";
+    let report = work.render(&format!("w.wspl {settings} -o v.npy --json")).ok().json();
+    let read = report["blocks_read"].as_u64().unwrap();
+    assert!(read <= 2 * 216, "{read} blocks: no more than two batches of frames");
+}
+
 #[test]
 fn verifying_and_rewriting_keep_their_budget_or_refuse_it() {
     let work = Work::new();

@@ -6,6 +6,7 @@ use super::tiers::wanted_above;
 use crate::remote::{FETCHED, PageCount};
 use std::collections::HashSet;
 use std::ops::Range;
+use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec::WindowCodec;
@@ -142,6 +143,16 @@ impl CoefficientFile {
         let mut leaves = self.leaves(window).iter().take_while(|leaf| leaf.tier > 0);
         let first = leaves.next()?;
         Some(first.data_offset..leaves.last().unwrap_or(first).bytes().end)
+    }
+
+    /// The entries of the blocks above those of a region and of others beside them, a leaf of the directory at a time.
+    pub(crate) fn entries_above(
+        &self,
+        window: u32,
+        channel: usize,
+        region: &Region,
+    ) -> impl Iterator<Item = Result<Arc<Vec<BlockEntry>>>> {
+        self.leaves_above(window, channel, region).map(|leaf| self.kept_leaf(leaf))
     }
 
     /// The leaves that list the blocks above those of a region.

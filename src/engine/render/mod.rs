@@ -60,7 +60,7 @@ mod pictures;
 pub mod partial;
 
 pub use batches::{
-    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, Order,
+    BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, Order,
     OverviewRequest, PlaneValues, SampleErrors, Scene, Scratch, Selection, Thinning, stride,
 };
 pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};

@@ -6,14 +6,19 @@ use crate::render::config::RenderConfig;
 use crate::render::report::RenderReport;
 use wavesplat_core::base::error::Result;
 
-/// How many of some frames to render together.
-pub(in crate::render) type Together<'a> = dyn Fn(&dyn Scene, usize) -> usize + 'a;
+/// How many of some frames, the first ones, to render together.
+pub(in crate::render) type Together<'a, M> = dyn Fn(&mut dyn Scene, &[usize]) -> Result<Share<M>> + 'a;
+
+/// A number of frames that are rendered together, and how they use the memory.
+pub(in crate::render) struct Share<M> {
+    pub(in crate::render) frames: usize,
+    pub(in crate::render) memory: M,
+}
 
 /// The settings of a rendering, and how much of it fits in memory.
-#[derive(Clone, Copy)]
-pub(in crate::render) struct Job<'a> {
+pub(in crate::render) struct Job<'a, M> {
     pub(in crate::render) config: &'a RenderConfig,
-    pub(in crate::render) together: &'a Together<'a>,
+    pub(in crate::render) together: &'a Together<'a, M>,
     /// The views in which to estimate errors; empty unless pictures are projections.
     pub(in crate::render) views: &'a [Expectation<'a>],
 }
@@ -26,18 +31,20 @@ pub(in crate::render) struct RenderedBatch<P> {
 
 /// Renders all frames, as many at a time as fit in the budget. `render` makes the pictures of one channel of a batch;
 /// `give` takes the pictures of all its channels.
-pub(in crate::render) fn for_each_batch<P>(
+pub(in crate::render) fn for_each_batch<P, M>(
     scene: &mut dyn Scene,
-    job: Job<'_>,
+    job: &Job<'_, M>,
     report: &mut RenderReport,
-    mut render: impl FnMut(&dyn FrameBatch, &mut RenderReport) -> Result<P>,
+    mut render: impl FnMut(&dyn FrameBatch, &M, &mut RenderReport) -> Result<P>,
     mut give: impl FnMut(&[usize], Vec<RenderedBatch<P>>, &mut RenderReport) -> Result<()>,
 ) -> Result<()> {
-    let Job { config, together, views } = job;
+    let &Job { config, together, views } = job;
     let mut rest = config.frames.as_slice();
     while let Some(first) = rest.first() {
         let most = in_batch(scene, *first, rest);
-        let (frames, later) = rest.split_at(together(scene, most));
+        let share = together(scene, &rest[..most])?;
+        let (frames, later) = rest.split_at(share.frames);
+        let mut render = |batch: &dyn FrameBatch, report: &mut RenderReport| render(batch, &share.memory, report);
         let channels = (0..scene.channels()).map(|channel| {
             let request = BatchRequest { frames, channel, config, views };
             render_channel(scene, &request, report, &mut render)

@@ -21,7 +21,7 @@ mod units;
 mod samples;
 mod sampled;
 
-pub(super) use driver::{Job, RenderedBatch, for_each_batch, in_batch};
+pub(super) use driver::{Job, RenderedBatch, Share, for_each_batch, in_batch};
 pub use expectation::Expectation;
 pub(super) use expectation::{BlockInfluence, ViewWeights, alike};
 pub use layout::{Layout, Order};
@@ -31,5 +31,6 @@ pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
 pub(super) use read::{BlockAdder, BlockReader, BlockSource, ReadStats};
 pub(super) use sampled::SampledView;
 pub(super) use samples::{BlockSamples, SampleReader};
-pub use scene::{BatchOutcome, BatchRequest, FrameBatch, FrameBounds, Inverse, SampleErrors, Scene, Selection};
+pub use scene::{BatchOutcome, BatchRequest, BlockBytes, FrameBatch, FrameBounds};
+pub use scene::{Inverse, SampleErrors, Scene, Selection};
 pub(super) use units::Units;

@@ -55,6 +55,16 @@ pub trait Scene {
     /// An upper bound of the memory of one decoded block for a batch of `frames` frames, in bytes.
     fn block_bytes(&self, frames: usize, config: &RenderConfig) -> usize;
 
+    /// As [`Self::block_bytes`] for a number of frames, of the blocks that batches of some of these frames read: a scene that
+    /// knows them can state less. All are before the same [`Self::batch_end`].
+    ///
+    /// # Errors
+    /// Any error ends the rendering.
+    fn block_bytes_of(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<BlockBytes>> {
+        let most = self.block_bytes(frames.len(), config);
+        Ok(Box::new(move |_| most))
+    }
+
     /// Bytes that all blocks share, within a memory budget.
     fn shared_bytes(&self, _memory: usize) -> usize {
         0
@@ -109,6 +119,9 @@ impl RenderConfig {
         }
     }
 }
+
+/// The memory of one decoded block for a batch of a number of frames, in bytes.
+pub type BlockBytes = dyn Fn(usize) -> usize;
 
 /// A request for frames to render together.
 #[derive(Debug, Clone, Copy)]

@@ -15,7 +15,6 @@ use wavesplat_core::base::progress::Progress;
 /// Views that are splatted together.
 pub(super) struct ViewGroup<'a> {
     pub(super) weights: Vec<WeightSums<'a>>,
-    pub(super) budget: &'a Budget<'a>,
     pub(super) progress: &'a dyn Progress,
 }
 
@@ -23,17 +22,18 @@ pub(super) struct ViewGroup<'a> {
 pub(super) type Finish<'a, T> = dyn Fn(usize, ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync + 'a;
 
 impl ViewGroup<'_> {
-    /// Splats all planes of a batch. `finish(view, tile, pixels)` makes pixels of the sums of a tile; a view has one buffer
+    /// Splats all planes of a batch within a budget. `finish(view, tile, pixels)` makes pixels of the sums of a tile; a view has one buffer
     /// for all its pictures.
     pub(super) fn splat<T: Send, P: DerefMut<Target = [T]>>(
         &self,
         batch: &dyn FrameBatch,
+        budget: &Budget<'_>,
         report: &mut RenderReport,
         pictures: &mut [P],
         finish: &Finish<'_, T>,
     ) -> Result<()> {
-        let (layout, budget) = (batch.layout(), self.budget);
-        let blocks = self.visible_blocks(batch, report);
+        let layout = batch.layout();
+        let blocks = self.visible_blocks(batch, budget.size(), report);
         let mut left = vec![TileRect::whole(budget.size())];
         while let Some(rect) = left.pop() {
             let mut parts = budget.split(&layout, &rect).into_iter();
@@ -63,8 +63,8 @@ impl ViewGroup<'_> {
     }
 
     /// The selected blocks that reach a pixel of any view. Counts the others in the report.
-    fn visible_blocks(&self, batch: &dyn FrameBatch, report: &mut RenderReport) -> Vec<usize> {
-        let whole = TileRect::whole(self.budget.size());
+    fn visible_blocks(&self, batch: &dyn FrameBatch, size: [usize; 2], report: &mut RenderReport) -> Vec<usize> {
+        let whole = TileRect::whole(size);
         let mut blocks = batch.selection().blocks.clone();
         let selected = blocks.len();
         blocks.retain(|b| self.weights.iter().any(|view| view.setup.reaches(*b, &whole)));

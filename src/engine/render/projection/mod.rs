@@ -91,15 +91,17 @@ fn render_views(
     let mut clock = Instant::now();
     let weights =
         budget.setups().iter().map(|setup| splat_weights(setup, config, budget)).collect::<Result<Vec<_>>>()?;
-    let group = ViewGroup { weights, budget, progress: *progress };
+    let group = ViewGroup { weights, progress: *progress };
     let expectations: Vec<_> =
         group.weights.iter().map(|weights| Expectation::new(weights.view(), config.quantity)).collect();
     report.planned_bytes = report.planned_bytes.max(budget.planned_for_ones() as u64);
     lap(&mut clock, &mut report.weight_seconds);
-    let together = |scene: &dyn Scene, most: usize| budget.frames(scene, config, most);
+    let together = |scene: &mut dyn Scene, frames: &[usize]| budget.share(scene, frames, config);
     let job = Job { config, together: &together, views: &expectations };
-    let render = |batch: &dyn FrameBatch, report: &mut RenderReport| render_batch(batch, &group, config, report);
-    for_each_batch(scene, job, report, render, |frames, channels, report| {
+    let render = |batch: &dyn FrameBatch, budget: &Budget<'_>, report: &mut RenderReport| {
+        render_batch(batch, &group, budget, config, report)
+    };
+    for_each_batch(scene, &job, report, render, |frames, channels, report| {
         for i in 0..group.weights.len() {
             add_expected_error(&channels, i, frames.len(), &mut report.views[first_view + i].expected_error);
             let pictures: Vec<&Pictures> = channels.iter().map(|channel| &channel.pictures[i]).collect();
@@ -119,17 +121,18 @@ fn add_expected_error(channels: &[RenderedBatch<Vec<Pictures>>], view: usize, fr
 fn render_batch(
     batch: &dyn FrameBatch,
     group: &ViewGroup<'_>,
+    budget: &Budget<'_>,
     config: &RenderConfig,
     report: &mut RenderReport,
 ) -> Result<Vec<Pictures>> {
-    let (layout, pixels) = (batch.layout(), group.budget.pixels());
+    let (layout, pixels) = (batch.layout(), budget.pixels());
     let reconstructors: Vec<_> =
         group.weights.iter().map(|weights| PixelReconstructor::new(batch, weights, config)).collect();
     let empty = |view: &PixelReconstructor<'_>| Zeroed::new(view.pictures() * pixels);
     let mut pictures: Vec<Zeroed<f32>> = reconstructors.iter().map(empty).collect();
     let finish =
         |view: usize, tile: ResolvedTile<'_>, rows: &mut Pixels<'_, f32>| reconstructors[view].tile(tile, rows);
-    group.splat(batch, report, &mut pictures, &finish)?;
+    group.splat(batch, budget, report, &mut pictures, &finish)?;
     if config.certify {
         let errors = pictures.iter().flat_map(|all| &all[layout.frames * pixels..]);
         let largest = errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);

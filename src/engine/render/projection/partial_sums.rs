@@ -107,16 +107,18 @@ impl Projection {
             let budget = Budget::for_most_views(config, Kept::Sums, scene, &self.setups[first..views.end]);
             let mut clock = Instant::now();
             let weights = budget.setups().iter().map(|setup| splat_part_weights(setup, &budget));
-            let group = ViewGroup { weights: weights.collect::<Result<_>>()?, budget: &budget, progress: *progress };
+            let group = ViewGroup { weights: weights.collect::<Result<_>>()?, progress: *progress };
             report.planned_bytes = report.planned_bytes.max(budget.planned_for_ones() as u64);
             lap(&mut clock, &mut report.weight_seconds);
             for (view, weights) in group.weights.iter().enumerate() {
                 sink(PartialSums::Weights { view: first + view, sums: &weights.sums })?;
             }
-            let together = |scene: &dyn Scene, most: usize| budget.frames(scene, config, most);
+            let together = |scene: &mut dyn Scene, frames: &[usize]| budget.share(scene, frames, config);
             let job = Job { config, together: &together, views: &[] };
-            let render = |batch: &dyn FrameBatch, report: &mut RenderReport| sum_batch(batch, &group, report);
-            for_each_batch(scene, job, report, render, |frames, channels, _| {
+            let render = |batch: &dyn FrameBatch, budget: &Budget<'_>, report: &mut RenderReport| {
+                sum_batch(batch, &group, budget, report)
+            };
+            for_each_batch(scene, &job, report, render, |frames, channels, _| {
                 for view in 0..group.weights.len() {
                     let channels: Vec<&Planes> = channels.iter().map(|channel| &channel.pictures[view]).collect();
                     for n in 0..frames.len() {
@@ -147,12 +149,17 @@ impl Planes {
 }
 
 /// The sums of a batch in some views.
-fn sum_batch(batch: &dyn FrameBatch, group: &ViewGroup<'_>, report: &mut RenderReport) -> Result<Vec<Planes>> {
-    let (layout, keeper, pixels) = (batch.layout(), PartialSumKeeper { batch }, group.budget.pixels());
+fn sum_batch(
+    batch: &dyn FrameBatch,
+    group: &ViewGroup<'_>,
+    budget: &Budget<'_>,
+    report: &mut RenderReport,
+) -> Result<Vec<Planes>> {
+    let (layout, keeper, pixels) = (batch.layout(), PartialSumKeeper { batch }, budget.pixels());
     let planes = layout.frames * (1 + usize::from(layout.absent));
     let mut pictures: Vec<Zeroed<f64>> = group.weights.iter().map(|_| Zeroed::new(planes * pixels)).collect();
     let keep = |_: usize, tile: ResolvedTile<'_>, pixels: &mut Pixels<'_, f64>| keeper.tile(tile, pixels);
-    group.splat(batch, report, &mut pictures, &keep)?;
+    group.splat(batch, budget, report, &mut pictures, &keep)?;
     Ok(pictures.into_iter().map(|all| Planes { pixels, all, missing: layout.absent }).collect())
 }
 

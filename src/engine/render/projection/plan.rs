@@ -3,18 +3,20 @@
 //! The number of views and frames rendered together, the pixels of a band and the blocks decoded together do not change
 //! any pixel.
 
-use crate::render::batches::{Layout, Scene, in_batch};
+use crate::render::batches::{Layout, Scene, Share, in_batch};
 use crate::render::config::RenderConfig;
 use crate::render::splat::footprints::Splats;
 use crate::render::splat::sparse_terms::SparseTerms;
 use crate::render::splat::tile_rect::{TILE, TileRect, WIDEST};
 use crate::render::splat::{DoubleRoom, ViewSetup};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::memory;
 
 /// The memory of views that are rendered together.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Budget<'a> {
     setups: &'a [ViewSetup],
     /// Bytes that do not depend on how the work is divided.
@@ -29,8 +31,8 @@ pub(super) struct Budget<'a> {
     /// The largest block.
     block: Region,
     block_bytes: usize,
-    /// The largest number of planes of a band that needed sums in f64 so far.
-    doubles: AtomicUsize,
+    /// The largest number of planes of a band that needed sums in f64 so far, in all batches.
+    doubles: Arc<AtomicUsize>,
 }
 
 /// Planes of a band: all of them, and those of all views that have sums in f64 as well.
@@ -95,7 +97,7 @@ impl<'a> Budget<'a> {
         let available = config.memory.saturating_sub(fixed);
         let block_bytes = scene.block_bytes(most_frames(scene, &config.frames), config);
         let block = scene.blocks().region(0);
-        let doubles = AtomicUsize::new(0);
+        let doubles = Arc::default();
         Self { setups, fixed, available, size, pixel_bytes, together, block, block_bytes, doubles }
     }
 
@@ -217,8 +219,15 @@ impl<'a> Budget<'a> {
         self.plane_bytes(size) + rayon::current_num_threads() * copied
     }
 
+    /// How many of some frames, the first ones, to render together, and the budget for them.
+    pub(super) fn share(&self, scene: &mut dyn Scene, frames: &[usize], config: &RenderConfig) -> Result<Share<Self>> {
+        let block_bytes = scene.block_bytes_of(frames, config)?(frames.len());
+        let budget = Self { block_bytes, ..self.clone() };
+        Ok(Share { frames: budget.frames(scene, config, frames.len()), memory: budget })
+    }
+
     /// How many of `most` frames to render together.
-    pub(super) fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
+    fn frames(&self, scene: &dyn Scene, config: &RenderConfig, most: usize) -> usize {
         let size = self.size.map(|n| n.min(PREFERRED_SIDE));
         let fits = |f: &usize| self.fits(*f, self.planes(scene.most_planes(*f, config)), size);
         (1..=most).rev().find(fits).unwrap_or(1)

@@ -10,8 +10,8 @@ use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule};
 use crate::file::promise::share_tolerance;
 use crate::file::{CoefficientFile, DecodedBlock, Prefetch};
 use crate::render::batches::{
-    BatchOutcome, BatchRequest, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, OverviewRequest,
-    SampleErrors, Scene, Selection,
+    BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout,
+    OverviewRequest, SampleErrors, Scene, Selection,
 };
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::report::LeftOut;
@@ -43,14 +43,10 @@ impl CoefficientScene {
     /// later windows as fit.
     fn fetch_ahead(&mut self, request: &BatchRequest<'_>) -> Result<()> {
         let (channel, config) = (request.channel, request.config);
-        let Some(mut prefetch) = Prefetch::new(&self.file) else { return Ok(()) };
-        if request.frames[0] < self.fetched[channel] {
-            return Ok(());
-        }
-        let later = &config.frames[config.frames.partition_point(|frame| *frame < request.frames[0])..];
-        let region = config.region.unwrap_or(self.file.grid.whole());
-        prefetch.leaves(self.file.by_window(later), channel, &region)?;
-        let fetched = &mut self.fetched[channel];
+        let Some(mut prefetch) = self.prefetch(channel, request.frames) else { return Ok(()) };
+        let later = later(request.frames, config);
+        prefetch.leaves(self.file.by_window(later), channel, &self.region(config))?;
+        let mut fetched = self.fetched[channel];
         prefetch.gather(self.file.by_window(later), |frames, prefetch| {
             // In other modes, which blocks are hidden is known later.
             if config.mode.is_projection() {
@@ -59,11 +55,30 @@ impl CoefficientScene {
                 self.file.blocks.sort_nested(&mut blocks);
                 batch.gather(&blocks, prefetch)?;
             }
-            *fetched = frames[frames.len() - 1] + 1;
+            fetched = frames[frames.len() - 1] + 1;
             Ok(())
         })?;
-        if config.mode.is_projection() { prefetch.finish() } else { Ok(()) }
+        if config.mode.is_projection() {
+            prefetch.finish()?;
+        }
+        self.fetched[channel] = fetched;
+        Ok(())
     }
+
+    /// What fetches parts of a remote file, unless those for some frames were fetched.
+    fn prefetch(&self, channel: usize, frames: &[usize]) -> Option<Prefetch<'_>> {
+        Prefetch::new(&self.file).filter(|_| self.fetched[channel] <= frames[0])
+    }
+
+    /// The voxels that are wanted.
+    fn region(&self, config: &RenderConfig) -> Region {
+        config.region.unwrap_or(self.file.grid.whole())
+    }
+}
+
+/// The wanted frames from the first of some on.
+fn later<'a>(frames: &[usize], config: &'a RenderConfig) -> &'a [usize] {
+    &config.frames[config.frames.partition_point(|frame| *frame < frames[0])..]
 }
 
 impl From<CoefficientFile> for CoefficientScene {
@@ -107,7 +122,20 @@ impl Scene for CoefficientScene {
 
     fn block_bytes(&self, frames: usize, config: &RenderConfig) -> usize {
         let asked = self.file.by_window(&config.frames).map(<[usize]>::len);
-        self.needs.block_bytes(frames, asked, config.mode.is_projection())
+        self.needs.of_all().bytes(frames, asked, config.mode.is_projection())
+    }
+
+    fn block_bytes_of(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<BlockBytes>> {
+        let (window, region) = (self.file.window_of(frames[0]), self.region(config));
+        for channel in 0..self.file.channels() {
+            if let Some(prefetch) = self.prefetch(channel, frames) {
+                prefetch.leaves(self.file.by_window(later(frames, config)), channel, &region)?;
+            }
+        }
+        let needs = self.needs.of_window(&self.file, window, &region)?.clone();
+        let asked: Vec<usize> = self.file.by_window(&config.frames).map(<[usize]>::len).collect();
+        let is_projection = config.mode.is_projection();
+        Ok(Box::new(move |frames| needs.bytes(frames, asked.iter().copied(), is_projection)))
     }
 
     fn shared_bytes(&self, memory: usize) -> usize {

@@ -3,7 +3,9 @@
 use super::batch_plan::{SplatSource, are_few, error_planes};
 use crate::file::CoefficientFile;
 use crate::render::config::RenderConfig;
-use wavesplat_format::{Axis, LeafEntry, Window};
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Region;
+use wavesplat_format::{Axis, BlockEntry, LeafEntry, PartKind, Window};
 
 /// Upper bounds for all windows of a file.
 pub(super) struct FileNeeds {
@@ -11,10 +13,25 @@ pub(super) struct FileNeeds {
     windows: Vec<WindowKind>,
     what: SplatSource,
     block: BlockNeeds,
+    /// The blocks of a region in one window, the last one that was asked for.
+    last: Option<(u32, Region, BlockNeeds)>,
+}
+
+/// The most that a block stores.
+struct Stored {
+    /// Codes that are not zero.
+    codes: usize,
+    /// Outliers and missing samples.
+    outliers: usize,
+    /// Whether all samples of some block are stored exactly.
+    exact: bool,
+    missing: bool,
 }
 
 /// Bytes of the largest block, by what is done with it.
-struct BlockNeeds {
+#[derive(Clone)]
+pub(super) struct BlockNeeds {
+    what: SplatSource,
     /// What is read: codes, what is stored exactly, and the nodes that the block begins with.
     read: usize,
     /// The block above while it is decoded, before the block is read.
@@ -56,20 +73,22 @@ impl FileNeeds {
         let mut windows: Vec<WindowKind> = (0..count).map(|window| WindowKind::new(file, what, window)).collect();
         windows.sort_unstable();
         windows.dedup();
-        let block = BlockNeeds::new(file, windows.iter().any(|window| window.missing));
-        Self { windows, what, block }
+        let block = BlockNeeds::new(file, what, &Stored::at_most(file));
+        Self { windows, what, block, last: None }
     }
 
-    /// Bytes of a decoded block for a batch of `frames` frames. `asked` has the number of requested frames of each window.
-    pub(super) fn block_bytes(&self, frames: usize, asked: impl Iterator<Item = usize>, is_projection: bool) -> usize {
-        let BlockNeeds { read, above, whole, one, always_whole, samples, values, coefficients } = self.block;
-        if self.what == SplatSource::Samples {
-            return above.max(read + whole + samples);
+    /// Upper bounds for all blocks.
+    pub(super) fn of_all(&self) -> &BlockNeeds {
+        &self.block
+    }
+
+    /// Upper bounds for the blocks of a region in a window, as the directory lists them.
+    pub(super) fn of_window(&mut self, file: &CoefficientFile, window: u32, region: &Region) -> Result<&BlockNeeds> {
+        if !self.last.as_ref().is_some_and(|(of, within, _)| (*of, within) == (window, region)) {
+            let needs = BlockNeeds::new(file, self.what, &Stored::in_window(file, window, region)?);
+            self.last = Some((window, *region, needs));
         }
-        let coded = if always_whole || !is_projection { whole } else { one };
-        let few = |asked: &usize| are_few(*asked, coefficients);
-        let frames = if is_projection { asked.filter(few).max().unwrap_or(0) } else { frames };
-        above.max(read + coded + values * frames)
+        Ok(self.last.as_ref().map_or(&self.block, |(_, _, needs)| needs))
     }
 
     /// The largest number of planes of a projection of `frames` frames.
@@ -97,29 +116,66 @@ impl WindowKind {
     }
 }
 
+impl Stored {
+    /// In any block, as far as the leaves of the directory tell.
+    fn at_most(file: &CoefficientFile) -> Self {
+        let windows = 0..file.metadata().windows.len() as u32;
+        let leaves = || windows.clone().flat_map(|window| file.leaves(window));
+        let most = |count: fn(&LeafEntry) -> u64| leaves().map(count).max().unwrap_or(0);
+        Self {
+            codes: most(|leaf| leaf.coded) as usize,
+            outliers: most(|leaf| leaf.outliers.saturating_add(leaf.missing)) as usize,
+            exact: leaves().any(|leaf| leaf.exact > 0),
+            missing: windows.clone().any(|window| file.has_missing(window)),
+        }
+    }
+
+    /// In a block that touches a region, or in one above those.
+    fn in_window(file: &CoefficientFile, window: u32, region: &Region) -> Result<Self> {
+        let mut most = Self { codes: 0, outliers: 0, exact: false, missing: file.has_missing(window) };
+        for channel in 0..file.channels() {
+            for entries in file.entries(window, channel, region) {
+                entries?.iter().for_each(|entry| most.add(entry));
+            }
+            // A damaged leaf of these is reported when it is needed.
+            for entries in file.entries_above(window, channel, region).flatten() {
+                entries.iter().for_each(|entry| most.add(entry));
+            }
+        }
+        Ok(most)
+    }
+
+    fn add(&mut self, entry: &BlockEntry) {
+        let count = |is_counted: fn(PartKind) -> bool| {
+            let parts = entry.parts.iter().filter(|part| is_counted(part.kind));
+            parts.fold(0_u64, |sum, part| sum.saturating_add(part.stats.count)) as usize
+        };
+        self.codes = self.codes.max(count(|kind| matches!(kind, PartKind::Level(_))));
+        self.outliers = self.outliers.max(count(|kind| matches!(kind, PartKind::Outliers | PartKind::Missing)));
+        self.exact |= entry.is_exact();
+    }
+}
+
 impl BlockNeeds {
-    fn new(file: &CoefficientFile, is_missing: bool) -> Self {
+    fn new(file: &CoefficientFile, what: SplatSource, stores: &Stored) -> Self {
         let windows = &file.metadata().windows;
-        let leaves = || (0..windows.len() as u32).flat_map(|window| file.leaves(window));
         let (largest, stored, coefficient) = (file.largest_block(), file.most_codes(), file.coefficient_size());
-        let most = |count: fn(&LeafEntry) -> u64| leaves().map(count).max().unwrap_or(0).min(stored as u64) as usize;
         let codes = match windows.iter().all(|window| window.pyramid.is_some()) {
-            true => most(|leaf| leaf.coded) * CODE_BYTES,
+            true => stores.codes.min(stored) * CODE_BYTES,
             false => stored * (CODE_BYTES + size_of::<i32>()),
         };
-        let exact = if leaves().any(|leaf| leaf.exact > 0) { 2 * stored * file.sample().size() } else { 0 };
-        let outliers = match file.skips_damage() {
-            true => stored,
-            false => most(|leaf| leaf.outliers.saturating_add(leaf.missing)),
-        };
-        let mask = if is_missing { stored } else { 0 };
+        let exact = if stores.exact { 2 * stored * file.sample().size() } else { 0 };
+        let outliers = if file.skips_damage() { stored } else { stores.outliers.min(stored) };
+        let mask = if stores.missing { stored } else { 0 };
         let refines_time = |window: &Window| window.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
         // Scratch are the lattices before the last passes: of one k at a time, unless time is refined.
         let plane = file.blocks.region(0).voxels();
         let refined = |coefficients: usize| (coefficients + plane).max(coefficients * 3 / 2) * coefficient;
+        let largest_above = file.largest_block_above();
         Self {
+            what,
             read: codes + exact + outliers * OUTLIER_BYTES + mask + file.known_bytes(),
-            above: file.largest_block_above() * CODE_BYTES + refined(file.largest_block_above()) + file.known_bytes(),
+            above: largest_above.min(stores.codes) * CODE_BYTES + refined(largest_above) + file.known_bytes(),
             whole: refined(largest),
             one: refined(plane),
             always_whole: outliers > 0 || windows.iter().any(refines_time),
@@ -127,5 +183,17 @@ impl BlockNeeds {
             values: plane * size_of::<f64>(),
             coefficients: file.most_coefficients(),
         }
+    }
+
+    /// Bytes of a decoded block for a batch of `frames` frames. `asked` has the number of requested frames of each window.
+    pub(super) fn bytes(&self, frames: usize, asked: impl Iterator<Item = usize>, is_projection: bool) -> usize {
+        let &Self { what, read, above, whole, one, always_whole, samples, values, coefficients } = self;
+        if what == SplatSource::Samples {
+            return above.max(read + whole + samples);
+        }
+        let coded = if always_whole || !is_projection { whole } else { one };
+        let few = |asked: &usize| are_few(*asked, coefficients);
+        let frames = if is_projection { asked.filter(few).max().unwrap_or(0) } else { frames };
+        above.max(read + coded + values * frames)
     }
 }
