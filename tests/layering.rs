@@ -71,6 +71,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
             "engine/render/scenes/coefficients.rs",
             "engine/render/scenes/overview.rs",
             "jobs/extract/mod.rs",
+            "jobs/extract/placed.rs",
             "cli/common.rs",
         ],
     ),

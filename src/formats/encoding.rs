@@ -18,9 +18,14 @@ pub struct Encoding {
 }
 
 impl Encoding {
+    /// Whether little-endian samples are written as they are.
+    pub fn is_plain(&self) -> bool {
+        self.from == self.to && !self.big_endian
+    }
+
     /// Writes little-endian samples in the file's encoding.
     pub fn write(&self, samples: &[u8], out: &mut dyn Write) -> io::Result<()> {
-        if self.from == self.to && !self.big_endian {
+        if self.is_plain() {
             return out.write_all(samples);
         }
         samples.chunks(RUN * self.from.size()).try_for_each(|run| out.write_all(&self.converted(run)))

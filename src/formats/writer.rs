@@ -8,6 +8,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::output::Placed;
 use wavesplat_core::base::sample::SampleType;
 
 /// A way to write samples.
@@ -83,6 +84,16 @@ pub(crate) type CreateFolder = fn(&Path, &Contents, Encoding, bool) -> Result<Bo
 pub trait SampleSink: fmt::Debug {
     /// Writes the next samples, given little-endian.
     fn write(&mut self, samples: &[u8]) -> Result<()>;
+
+    /// The file of samples, if it is one that takes them as they are and at any place. Nothing must have been written.
+    fn placed(&mut self) -> Result<Option<Placed<'_>>> {
+        Ok(None)
+    }
+
+    /// Continues after all samples, which were placed.
+    fn skip_placed(&mut self) -> Result<()> {
+        Ok(())
+    }
 
     /// Completes the output.
     fn finish(self: Box<Self>) -> Result<()>;

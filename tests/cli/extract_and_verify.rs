@@ -115,6 +115,23 @@ fn parts_are_slices_of_the_whole() {
     assert!(work.wavesplat(&format!("extract a.wspl -o - --memory {small_memory}MiB")).ok().out == mapped);
 }
 
+/// A plain file gets its samples block by block, a pipe in order.
+#[test]
+fn a_file_has_the_bytes_of_a_pipe_with_any_memory() {
+    let work = Work::new();
+    work.write("b.npy", Archive::smooth([40, 30, 26], 40).npy());
+    work.wavesplat("convert b.npy -o b.wspl --block 8 --window 16").ok();
+    let least = work.wavesplat("extract b.wspl -o - --memory 1MiB").fails(2, &["--memory"]).mebibytes();
+    for chosen in ["", "--frames 3:20:4,30:34,-1 --region 5:37,:13,4:"] {
+        for (format, memory) in [("npy", least), ("npy", least + 1), ("raw", least + 2), ("nrrd", 512)] {
+            let line = format!("extract b.wspl --memory {memory}MiB --format {format} {chosen}");
+            let pipe = work.wavesplat(&format!("{line} -o -")).ok().out;
+            work.wavesplat(&format!("{line} -o b.out --force --threads 2")).ok();
+            assert!(work.read("b.out") == pipe, "{line}");
+        }
+    }
+}
+
 #[test]
 fn converting_an_extraction_of_all_types_works() {
     let work = Work::new();

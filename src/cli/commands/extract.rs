@@ -11,7 +11,7 @@ use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::CHANNELS;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_jobs::extract::{
-    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to,
+    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to_sink,
 };
 
 /// Decode a coefficient file back to samples
@@ -107,7 +107,7 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     let mut sink = Sink::create(files, &contents, args.force)?;
     format.notes(&contents).iter().for_each(|note| args.common.note(note));
     let progress = args.common.progress("extract", "frames");
-    let report = extract_to(&file, &config, &mut |samples| sink.write(samples), &progress)?;
+    let report = extract_to_sink(&file, &config, &mut sink, &progress)?;
     sink.finish()?;
     args.common.detail_read(report.file_bytes_read, report.file_bytes);
     args.common.report(&Extracted { report, files: paths }, args.output == Path::new(STANDARD))?;

@@ -16,7 +16,7 @@ use lock::locked;
 use std::ffi::OsString;
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::{FileExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::Arc;
@@ -33,6 +33,25 @@ pub const STANDARD: &str = "-";
 pub struct Output {
     path: PathBuf,
     target: Target,
+}
+
+/// A file that takes bytes at any place, from several threads.
+#[derive(Debug)]
+pub struct Placed<'a> {
+    path: &'a Path,
+    file: &'a File,
+    /// The place of byte 0.
+    start: u64,
+}
+
+impl Placed<'_> {
+    /// Writes bytes from a place on.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, at: u64, bytes: &[u8]) -> Result<()> {
+        self.file.write_all_at(bytes, self.start + at).map_err(|e| Error::io(self.path, "writing", e))
+    }
 }
 
 #[derive(Debug)]
@@ -138,6 +157,27 @@ impl Output {
         part.set_kept(bytes > 0);
         let cut = file.get_mut().set_len(bytes).and_then(|()| file.seek(SeekFrom::Start(bytes)));
         cut.map(drop).map_err(|e| Error::io(&part.path, "cutting", e))
+    }
+
+    /// The unfinished file, for bytes at other places than the next, and the place of the next. None if the output is not a file.
+    ///
+    /// # Errors
+    /// What was written before cannot be written to the file.
+    pub fn placed(&mut self) -> Result<Option<Placed<'_>>> {
+        let Target::File(part, file) = &mut self.target else { return Ok(None) };
+        let start = file.flush().and_then(|()| file.stream_position());
+        let start = start.map_err(|e| Error::io(&part.path, "writing", e))?;
+        Ok(Some(Placed { path: &self.path, file: file.get_ref(), start }))
+    }
+
+    /// Continues so many bytes further on in a file.
+    ///
+    /// # Errors
+    /// As [`Self::placed`].
+    pub fn skip(&mut self, bytes: u64) -> Result<()> {
+        let Target::File(part, file) = &mut self.target else { return Ok(()) };
+        let moved = file.seek_relative(bytes as i64);
+        moved.map_err(|e| Error::io(&part.path, "writing", e))
     }
 
     /// Whether dropping the output keeps the bytes written so far.

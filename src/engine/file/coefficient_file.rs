@@ -312,7 +312,7 @@ impl CoefficientFile {
         let fetched = self.fetch_leaves_of(std::iter::once(window), channel, region);
         let entries = move |leaf| {
             let touches = |entry: &BlockEntry| self.touches(entry.id.block, region);
-            Ok(self.leaf(leaf)?.into_iter().filter(touches).collect())
+            Ok(self.kept_leaf(leaf)?.iter().filter(|entry| touches(entry)).cloned().collect())
         };
         fetched.err().map(Err).into_iter().chain(self.reached(window, channel, region).map(entries))
     }

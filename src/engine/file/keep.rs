@@ -53,8 +53,8 @@ impl CoefficientFile {
     }
 
     /// The samples of a block, `frame * voxels + voxel`, and the stored bytes read. Only `wanted` frames have their samples. Uses the
-    /// cache, and adds blocks that are read again. If the caller needs only a part of the block (`is_part`), the cache takes it at the
-    /// first read.
+    /// cache, and adds blocks that are read again. If the caller needs all frames of a part of the block (`is_part`), the cache takes it
+    /// at the first read.
     pub fn samples(
         &self,
         codec: &WindowCodec,
@@ -71,7 +71,7 @@ impl CoefficientFile {
         if let Some(samples) = kept.samples(&key) {
             return Ok((samples, 0));
         }
-        let is_whole = wanted.coefficients.iter().all(|wanted| *wanted);
+        let is_whole = wanted.frames.len() == codec.frames();
         let is_again = kept.is_read_again(entry.id, self.lod);
         let is_kept = is_again || is_part && is_whole;
         if !is_kept {

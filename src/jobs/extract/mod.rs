@@ -6,8 +6,10 @@ mod contents;
 mod read;
 mod sink;
 mod strides;
+mod placed;
 
 pub use contents::contents;
+pub use placed::extract_to_sink;
 pub use read::read_region;
 pub use sink::{Files, Sink};
 pub use wavesplat_formats::{Contents, Direction, OutputAxis, SampleFormat, SampleOrder};
@@ -48,6 +50,11 @@ impl ExtractConfig {
     pub fn new(file: &CoefficientFile) -> Self {
         let (frames, order) = ((0..file.frames()).collect(), SampleOrder::default());
         Self { frames, region: file.grid.whole(), channel: 0, order, memory: memory::DEFAULT }
+    }
+
+    /// Bytes of the samples.
+    fn bytes(&self, file: &CoefficientFile) -> usize {
+        self.frames.len() * self.region.voxels() * file.sample().size()
     }
 
     /// An error unless the file has these frames and voxels and this channel.
@@ -107,37 +114,117 @@ pub fn extract_to(
     write: &mut dyn FnMut(&[u8]) -> Result<()>,
     progress: &dyn Progress,
 ) -> Result<ExtractReport> {
-    progress.start(Some(config.frames.len() as u64));
-    file.begin_run();
-    let mut report = ExtractReport::default();
-    let pieces = Pieces::new(file, config)?;
-    let all = config.frames.len() * config.region.voxels() * file.sample().size();
-    let mut buffers = Vec::new();
-    let list = pieces.list(file, config);
-    let (mut begun, mut fetched) = (0, 0);
-    for together in list.chunks(pieces.together(file, config)) {
-        progress.check()?;
-        if fetched < begun + together.len() {
-            fetched = begun + fetch_ahead(file, config.channel, &list[begun..])?;
-        }
-        begun += together.len();
-        buffers.resize_with(together.len(), Zeroed::default);
-        let read = together.par_iter().zip(&mut buffers);
-        let read = read.map(|(piece, bytes)| read_piece(file, config, piece, pieces.blocks, bytes));
-        for (read, bytes) in read.collect::<Result<Vec<_>>>()? {
-            write(bytes)?;
-            report.blocks_read += read.blocks_read;
-            report.bytes_read += read.bytes_read;
-            report.bytes += bytes.len() as u64;
+    let mut buffers: Vec<Zeroed<u8>> = Vec::new();
+    Extraction::in_order(file, config, Pieces::new(file, config)?).for_each_group(progress, |group, lengths| {
+        buffers.resize_with(lengths.len(), Zeroed::default);
+        let rooms: Vec<&mut [u8]> = buffers.iter_mut().zip(lengths).map(|(buffer, len)| room(buffer, *len)).collect();
+        let read = group.read(rooms)?;
+        buffers.iter().zip(lengths).try_for_each(|(buffer, len)| write(&buffer[..*len]))?;
+        Ok(read)
+    })
+}
+
+/// As [`extract`], to memory, which has room for all samples and no more.
+///
+/// # Errors
+/// As [`extract`], and [`Error::Setting`] for memory of another size.
+pub fn extract_into(
+    file: &CoefficientFile,
+    config: &ExtractConfig,
+    out: &mut [u8],
+    progress: &dyn Progress,
+) -> Result<ExtractReport> {
+    config.check(file)?;
+    if out.len() != config.bytes(file) {
+        return Err(Error::setting("out", format!("takes {} bytes, not {}", config.bytes(file), out.len())));
+    }
+    let mut left = out;
+    let windows = Pieces { items: [usize::MAX; 2], ..Pieces::new(file, config)? }; // so each block is decoded once
+    Extraction::in_order(file, config, windows).for_each_group(progress, |group, lengths| {
+        let (mut parts, after) = std::mem::take(&mut left).split_at_mut(lengths.iter().sum());
+        left = after;
+        let rooms = lengths.iter().map(|len| parts.split_off_mut(..*len).unwrap_or_default()).collect();
+        group.read(rooms)
+    })
+}
+
+/// The first `len` bytes of a buffer, which is replaced by a longer one if it is too short.
+fn room(buffer: &mut Zeroed<u8>, len: usize) -> &mut [u8] {
+    if buffer.len() < len {
+        *buffer = Zeroed::default();
+        *buffer = Zeroed::new(len);
+    }
+    &mut buffer[..len]
+}
+
+/// An extraction, divided into pieces.
+struct Extraction<'a> {
+    file: &'a CoefficientFile,
+    config: &'a ExtractConfig,
+    pieces: Pieces,
+    list: Vec<Piece>,
+}
+
+impl<'a> Extraction<'a> {
+    /// One whose pieces are in the order of the output.
+    fn in_order(file: &'a CoefficientFile, config: &'a ExtractConfig, pieces: Pieces) -> Self {
+        let list = pieces.list(file, config);
+        Self { file, config, pieces, list }
+    }
+
+    /// Reads all pieces, in groups that are decoded side by side. `read` gets each group and the bytes of each of its pieces.
+    fn for_each_group(
+        &self,
+        progress: &dyn Progress,
+        mut read: impl FnMut(&Group<'_>, &[usize]) -> Result<ExtractReport>,
+    ) -> Result<ExtractReport> {
+        let Self { file, config, pieces, list } = self;
+        progress.start(Some(config.frames.len() as u64));
+        file.begin_run();
+        let mut report = ExtractReport::default();
+        let all = config.bytes(file);
+        let (mut begun, mut fetched) = (0, 0);
+        for together in list.chunks(pieces.together(file, &list[0].region)) {
+            progress.check()?;
+            if fetched < begun + together.len() {
+                fetched = begun + fetch_ahead(file, config.channel, &list[begun..])?;
+            }
+            begun += together.len();
+            let lengths: Vec<usize> = together.iter().map(|piece| piece.bytes(file)).collect();
+            let group = Group { file, config, pieces: together, blocks: pieces.blocks };
+            let ExtractReport { blocks_read, bytes_read, .. } = read(&group, &lengths)?;
+            report.blocks_read += blocks_read;
+            report.bytes_read += bytes_read;
+            report.bytes += lengths.iter().sum::<usize>() as u64;
             let done = (report.bytes as u128 * config.frames.len() as u128 / all as u128) as usize;
             progress.advance((done - report.frames) as u64);
             report.frames = done;
         }
+        file.check_unchanged()?;
+        (report.file_bytes_read, report.file_bytes) = (file.bytes_read(), file.bytes());
+        progress.finish();
+        Ok(report)
     }
-    file.check_unchanged()?;
-    (report.file_bytes_read, report.file_bytes) = (file.bytes_read(), file.bytes());
-    progress.finish();
-    Ok(report)
+}
+
+/// Pieces that are decoded side by side.
+struct Group<'a> {
+    file: &'a CoefficientFile,
+    config: &'a ExtractConfig,
+    pieces: &'a [Piece],
+    /// Blocks that each decodes at a time.
+    blocks: usize,
+}
+
+impl Group<'_> {
+    /// Reads each piece into its room, which has just its size.
+    fn read(&self, rooms: Vec<&mut [u8]>) -> Result<ExtractReport> {
+        let read = |(piece, room)| read_piece(self.file, self.config, piece, self.blocks, room);
+        let read = self.pieces.par_iter().zip(rooms).map(read).collect::<Result<Vec<ExtractReport>>>()?;
+        let (blocks_read, bytes_read) =
+            read.iter().fold((0, 0), |sum, one| (sum.0 + one.blocks_read, sum.1 + one.bytes_read));
+        Ok(ExtractReport { blocks_read, bytes_read, ..ExtractReport::default() })
+    }
 }
 
 /// The amount decoded at a time: some items of the slowest axis, or one of its items and some items of the second axis.
@@ -146,6 +233,8 @@ struct Pieces {
     items: [usize; 2],
     /// Blocks decoded at a time.
     blocks: usize,
+    /// Bytes that pieces may take.
+    room: usize,
 }
 
 /// Frames and voxels that are decoded together, in the order of the output.
@@ -170,12 +259,12 @@ impl Pieces {
         file.limit_shared(config.memory);
         let blocks = (available / block_bytes(file)).clamp(1, rayon::current_num_threads());
         let planes = available / plane.max(1);
-        Ok(Self { blocks, items: [(planes / second.max(1)).max(1), planes.min(second.max(1))] })
+        Ok(Self { blocks, room: available, items: [(planes / second.max(1)).max(1), planes.min(second.max(1))] })
     }
 
     /// Pieces that are decoded side by side: several if each touches few blocks, as the series of a voxel does.
-    fn together(&self, file: &CoefficientFile, config: &ExtractConfig) -> usize {
-        let touched = file.blocks.touching(&config.region).take(self.blocks).count();
+    fn together(&self, file: &CoefficientFile, region: &Region) -> usize {
+        let touched = file.blocks.touching(region).take(self.blocks).count();
         (self.blocks / touched.max(1)).max(1)
     }
 
@@ -191,6 +280,11 @@ impl Pieces {
 }
 
 impl Piece {
+    /// Bytes of its samples.
+    fn bytes(&self, file: &CoefficientFile) -> usize {
+        self.frames.len() * self.region.voxels() * file.sample().size()
+    }
+
     /// Cuts the piece along an axis, in the axis' direction, into pieces of at most so many items, and of frames of one
     /// window.
     fn divided(self, along: OutputAxis, items: usize, file: &CoefficientFile) -> Vec<Self> {
@@ -222,29 +316,23 @@ fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
 
-/// The samples of a piece, in `buffer`, and the blocks that it read.
-fn read_piece<'a>(
+/// Reads the samples of a piece into `out`, which has just their size.
+fn read_piece(
     file: &CoefficientFile,
     config: &ExtractConfig,
     piece: &Piece,
     at_once: usize,
-    buffer: &'a mut Zeroed<u8>,
-) -> Result<(ExtractReport, &'a [u8])> {
+    out: &mut [u8],
+) -> Result<ExtractReport> {
     let mut report = ExtractReport::default();
     let strides = Strides::new(&config.order, piece.frames.len(), &piece.region);
-    let bytes = piece.frames.len() * piece.region.voxels() * file.sample().size();
-    if buffer.len() < bytes {
-        *buffer = Zeroed::default();
-        *buffer = Zeroed::new(bytes);
-    }
-    let out = &mut buffer[..bytes]; // blocks overwrite all of it
     let mut first = 0;
     for frames in file.by_window(&piece.frames) {
         let target = Target { strides, region: piece.region, first };
-        read_window(file, config.channel, frames, &target, at_once, out, &mut report)?;
+        read_window(file, config.channel, frames, &target, at_once, out, &mut report)?; // blocks overwrite all of it
         first += frames.len();
     }
-    Ok((report, out))
+    Ok(report)
 }
 
 /// Where samples go in the array of a piece.

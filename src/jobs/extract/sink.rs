@@ -6,7 +6,7 @@ use flate2::write::GzEncoder;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::output::{Numbered, Output, OutputFolder, STANDARD, Takes, commit_together};
+use wavesplat_core::base::output::{Numbered, Output, OutputFolder, Placed, STANDARD, Takes, commit_together};
 use wavesplat_formats::encoding::Encoding;
 use wavesplat_formats::writer::{OutputFiles, SampleSink, Samples, Writer};
 
@@ -152,6 +152,16 @@ impl<'a> Sink<'a> {
         self.0.write(samples)
     }
 
+    /// The file of samples, if it is one that takes them as they are and at any place. Nothing must have been written.
+    pub(super) fn placed(&mut self) -> Result<Option<Placed<'_>>> {
+        self.0.placed()
+    }
+
+    /// Continues after all samples, which were [`placed`](Self::placed).
+    pub(super) fn skip_placed(&mut self) -> Result<()> {
+        self.0.skip_placed()
+    }
+
     /// Commits the last file of samples, and writes the list or header if there is one.
     pub fn finish(self) -> Result<()> {
         self.0.finish()
@@ -192,6 +202,20 @@ impl<'a> FileSink<'a> {
 }
 
 impl SampleSink for FileSink<'_> {
+    fn placed(&mut self) -> Result<Option<Placed<'_>>> {
+        let Some(Stream::Plain(out)) = self.open.as_mut().filter(|_| self.files.samples.len() == 1) else {
+            return Ok(None);
+        };
+        if self.encoding.is_plain() { out.placed() } else { Ok(None) }
+    }
+
+    fn skip_placed(&mut self) -> Result<()> {
+        match &mut self.open {
+            Some(Stream::Plain(out)) => out.skip(std::mem::take(&mut self.left)),
+            _ => Ok(()),
+        }
+    }
+
     fn write(&mut self, mut samples: &[u8]) -> Result<()> {
         while !samples.is_empty() {
             if self.left == 0 {

@@ -13,14 +13,11 @@ use std::path::PathBuf;
 use wavesplat::Region;
 use wavesplat::base::address::is_address;
 use wavesplat::base::progress::Silent;
-use wavesplat::extract::{ExtractConfig, extract_to};
+use wavesplat::extract::{ExtractConfig, extract_into};
 use wavesplat::file::report::BoundReport;
 use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::picture::{Inputs, Session};
 use wavesplat::remote::{Cache, RemoteOptions};
-
-/// Bytes of blocks that stay decoded from one read or picture of a file to the next.
-const KEPT: usize = 256 << 20;
 
 /// Reads of fewer bytes end so soon that they need not be interruptible.
 const SHORT: usize = 16 << 20;
@@ -43,15 +40,15 @@ pub(crate) struct File {
 #[pymethods]
 impl File {
     #[new]
-    #[pyo3(signature = (path, lod = 0, cache_dir = None))]
-    fn new(py: Python<'_>, path: PathBuf, lod: u32, cache_dir: Option<PathBuf>) -> PyResult<Self> {
+    #[pyo3(signature = (path, lod = 0, cache_dir = None, cache = 0))]
+    fn new(py: Python<'_>, path: PathBuf, lod: u32, cache_dir: Option<PathBuf>, cache: usize) -> PyResult<Self> {
         let open = || {
             let inputs = inputs(path, cache_dir)?;
             let whole = match is_address(&inputs.paths[0]) {
                 true => CoefficientFile::open_remote(&inputs.paths[0], &inputs.remote)?,
                 false => CoefficientFile::open(&inputs.paths[0])?,
             };
-            let whole = whole.keeping_decoded(KEPT);
+            let whole = whole.keeping_decoded(cache);
             let session = Session::from_file(whole.clone(), inputs, 0);
             Ok(Self { file: whole.with_detail(lod)?, session })
         };
@@ -208,16 +205,9 @@ impl File {
         let config = ExtractConfig { frames, region, channel, memory, ..ExtractConfig::new(&self.file) };
         let mut out = out.try_readwrite().map_err(|e| PyValueError::new_err(format!("out: {e}")))?;
         let out = out.as_slice_mut()?;
-        let is_short = out.len() < SHORT;
-        let mut at = 0;
-        let mut write = |samples: &[u8]| {
-            let room = out.get_mut(at..at + samples.len());
-            at += samples.len();
-            room.map(|room| room.copy_from_slice(samples)).ok_or(wavesplat::Error::setting("out", "is too small"))
-        };
-        match is_short {
-            true => fork::call(py, || extract_to(&self.file, &config, &mut write, &Silent))?,
-            false => job::run(py, None, |progress, _| extract_to(&self.file, &config, &mut write, progress))?,
+        match out.len() < SHORT {
+            true => fork::call(py, || extract_into(&self.file, &config, out, &Silent))?,
+            false => job::run(py, None, |progress, _| extract_into(&self.file, &config, out, progress))?,
         };
         Ok(())
     }

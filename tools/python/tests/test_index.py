@@ -93,3 +93,15 @@ def test_repeated_items(pair):
     for key in ([0, 0, 2], [2, 0, 0, 1], [1, 1]):
         np.testing.assert_array_equal(file[3, key], decoded[3, key])
         np.testing.assert_array_equal(file[key, 3], decoded[key, 3])
+
+
+def test_what_was_decoded_is_kept_as_far_as_it_may(path):
+    for cache, is_read_again in (wavesplat._file.CACHE, False), (0, True):
+        with wavesplat.open(path, cache=cache) as file:
+            series = [file[:, 1, 2, 3], file[:, 1, 2, 3]]
+            before = file.bytes_read
+            series.append(file[:, 1, 2, 3])
+            assert (file.bytes_read > before) == is_read_again
+            np.testing.assert_array_equal(series[0], series[2])
+    with pytest.raises(ValueError, match="cache: takes 0 or more"):
+        wavesplat.open(path, cache=-1)

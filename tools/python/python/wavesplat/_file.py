@@ -25,16 +25,22 @@ from ._progress import Progress, reporting
 MEMORY = 512 << 20
 """Bytes that reading, converting and rendering may take beside their results."""
 
+CACHE = 512 << 20
+"""Bytes of decoded blocks that an open file keeps."""
 
-def open(path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None) -> File:
+
+def open(
+    path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None, cache: int = CACHE
+) -> File:
     """Opens a coefficient file, until `File.close` or the end of a ``with``. Samples are read when they are asked for. Blocks
-    that were decoded stay in memory for the next reads and pictures, up to 256 MiB, until the file is closed or gone.
+    that were decoded stay in memory for the next reads and pictures, until the file is closed or gone.
 
     Args:
         path: A ``.wspl`` file, or the address of one: ``https://host/run.wspl`` or ``s3://bucket/run.wspl``, as a string.
             ``file:///folder/run.wspl`` is a path, too.
         lod: Level of detail: every 2**lod-th voxel along each axis, read from the coarse levels alone.
         cache_dir: A folder that keeps what was read of remote files, up to 4 GiB. Several processes may share it.
+        cache: Bytes of decoded blocks that stay in memory. A loop over frames is fast if all samples of a window fit.
 
     Raises:
         FileNotFoundError: There is no such file.
@@ -42,7 +48,7 @@ def open(path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[s
         ValueError: It has no such level of detail.
 
     """
-    return File(path, lod=lod, cache_dir=cache_dir)
+    return File(path, lod=lod, cache_dir=cache_dir, cache=cache)
 
 
 class File:
@@ -57,13 +63,20 @@ class File:
     """
 
     def __init__(
-        self, path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None
+        self,
+        path: str | PathLike[str],
+        *,
+        lod: int = 0,
+        cache_dir: str | PathLike[str] | None = None,
+        cache: int = CACHE,
     ) -> None:
         """As `wavesplat.open`."""
-        if whole("lod", lod) < 0:
-            raise ValueError(f"lod: takes 0 or more, not {lod}")
-        self._path, self._lod, self._cache_dir = located(path), lod, cache_dir
-        self._native: _wavesplat.File | None = _wavesplat.File(self._path, lod, cache_dir)
+        for name, value in ("lod", lod), ("cache", cache):
+            if whole(name, value) < 0:
+                raise ValueError(f"{name}: takes 0 or more, not {value}")
+        self._path = located(path)
+        self._options: dict[str, Any] = {"lod": lod, "cache_dir": cache_dir, "cache": cache}
+        self._native: _wavesplat.File | None = _wavesplat.File(self._path, **self._options)
         self._process = os.getpid()
 
     @property
@@ -72,7 +85,7 @@ class File:
         if self._native is None:
             raise ValueError(f"{self._path}: is closed")
         if self._process != os.getpid() and "://" in self._path:
-            self._native = _same(self._path, self._lod, self._native.id, self._cache_dir)._file
+            self._native = _same(self._path, self._native.id, self._options)._file
             self._process = os.getpid()
         return self._native
 
@@ -92,7 +105,7 @@ class File:
         self.close()
 
     def __reduce__(self) -> tuple[Any, ...]:  # noqa: D105
-        return _same, (anywhere(self._path), self._lod, self.id, self._cache_dir)
+        return _same, (anywhere(self._path), self.id, self._options)
 
     def __repr__(self) -> str:  # noqa: D105
         if self.closed:
@@ -112,7 +125,8 @@ class File:
     @property
     def lod(self) -> int:
         """The level of detail: every 2**lod-th voxel along each axis is there."""
-        return self._lod
+        lod: int = self._options["lod"]
+        return lod
 
     @property
     def id(self) -> str:
@@ -371,7 +385,7 @@ class File:
             return Figure(path.read_bytes(), format, height)
 
     def _render(self, output: str, options: dict[str, Any], progress: Progress) -> None:
-        options = {"lod": self._lod or None, **options}
+        options = {"lod": self.lod or None, **options}
         memory = str(options.pop("memory", MEMORY))
         with reporting(progress, "render") as report:
             self._file.render(request(options), output, memory, report)
@@ -459,9 +473,9 @@ def anywhere(path: str) -> str:
     return path if "://" in path else os.path.abspath(path)
 
 
-def _same(path: str, lod: int, id: str, cache_dir: str | PathLike[str] | None) -> File:
-    """A file that is opened again, if it is still the same."""
-    file = File(path, lod=lod, cache_dir=cache_dir)
+def _same(path: str, id: str, options: dict[str, Any]) -> File:
+    """A file that is opened again with its options, if it is still the same."""
+    file = File(path, **options)
     if file.id != id:
         raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled or opened before")
     return file

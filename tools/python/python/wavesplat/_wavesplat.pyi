@@ -21,7 +21,7 @@ _Bytes = npt.NDArray[np.uint8]
 
 class File:
     def __init__(
-        self, path: str | PathLike[str], lod: int = 0, cache_dir: str | PathLike[str] | None = None
+        self, path: str | PathLike[str], lod: int = 0, cache_dir: str | PathLike[str] | None = None, cache: int = ...
     ) -> None: ...
     path: str
     id: str
