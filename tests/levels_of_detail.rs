@@ -103,6 +103,7 @@ fn levels_that_a_file_does_not_have_are_errors() {
     }
     let stored = of_blocks(&mut source, 4);
     let file = stored.open().with_detail(2).unwrap();
+    assert!(read_region(&file, 1..1, &file.grid.whole()).unwrap().is_empty());
     let samples: Vec<f32> = read_region(&file, 0..2, &Region { start: [1, 0, 2], end: [5, 3, 3] }).unwrap();
     assert_eq!(samples, [7.0; 2 * 12], "regions count voxels of the coarse lattice");
 }

@@ -35,7 +35,7 @@ pub struct Output {
     target: Target,
 }
 
-/// A file that takes bytes at any place, from several threads.
+/// A file that takes bytes at any place.
 #[derive(Debug)]
 pub struct Placed<'a> {
     path: &'a Path,

@@ -55,7 +55,7 @@ pub(super) struct DecodedBlocks {
 #[derive(Debug, Default)]
 struct Kept {
     entries: HashMap<DecodedKey, Entry>,
-    /// Blocks that were read in part.
+    /// Blocks that were read.
     seen: HashSet<(BlockId, u32)>,
     bytes: usize,
     run: u64,
@@ -92,7 +92,7 @@ impl DecodedBlocks {
         self.kept().run += 1;
     }
 
-    /// Whether a block was read in part before. It is remembered.
+    /// Whether a block was read before. It is remembered.
     pub(super) fn is_read_again(&self, id: BlockId, lod: u32) -> bool {
         let seen = &mut self.kept().seen;
         if seen.len() >= MOST_SEEN {
@@ -122,6 +122,13 @@ impl DecodedBlocks {
         }
     }
 
+    /// Whether so many bytes can be kept.
+    pub(super) fn has_room(&self, bytes: usize) -> bool {
+        let kept = self.kept();
+        let old = kept.old().map(|(_, entry)| entry.bytes).sum::<usize>();
+        kept.bytes - old + bytes <= self.room
+    }
+
     /// Keeps a block if there is room.
     pub(super) fn keep_block(&self, key: DecodedKey, block: &Arc<DecodedBlock>) {
         self.kept().put(key, Decoded::Block(block.clone()), block.bytes(), self.room);
@@ -142,6 +149,11 @@ impl Drop for DecodedBlocks {
 }
 
 impl Kept {
+    /// Entries that neither this run nor the one before used.
+    fn old(&self) -> impl Iterator<Item = (&DecodedKey, &Entry)> {
+        self.entries.iter().filter(|(_, entry)| entry.used + 1 < self.run)
+    }
+
     fn get(&mut self, key: &DecodedKey) -> Option<Decoded> {
         let entry = self.entries.get_mut(key)?;
         entry.used = self.run;
@@ -153,8 +165,8 @@ impl Kept {
             return;
         }
         while self.bytes + bytes > room {
-            let old = self.entries.iter().filter(|(_, entry)| entry.used + 1 < self.run);
-            let Some(oldest) = old.min_by_key(|(_, entry)| entry.used).map(|(key, _)| key.clone()) else { return };
+            let oldest = self.old().min_by_key(|(_, entry)| entry.used);
+            let Some(oldest) = oldest.map(|(key, _)| key.clone()) else { return };
             self.bytes -= self.entries.remove(&oldest).map_or(0, |entry| entry.bytes);
         }
         self.bytes += bytes;

@@ -145,7 +145,7 @@ impl CoefficientFile {
         Some(first.data_offset..leaves.last().unwrap_or(first).bytes().end)
     }
 
-    /// The entries of the blocks above those of a region and of others beside them, a leaf of the directory at a time.
+    /// The entries of the blocks above those of a region, and of their neighbours, a leaf of the directory at a time.
     pub(crate) fn entries_above(
         &self,
         window: u32,

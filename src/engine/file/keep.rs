@@ -12,7 +12,7 @@ use wavesplat_format::BlockEntry;
 impl CoefficientFile {
     /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
     pub fn keeping_decoded(mut self, bytes: usize) -> Self {
-        self.kept = Some(Arc::new(DecodedBlocks::new(bytes)));
+        self.kept = (bytes > 0).then(|| Arc::new(DecodedBlocks::new(bytes)));
         self
     }
 
@@ -73,8 +73,8 @@ impl CoefficientFile {
         }
         let is_whole = wanted.frames.len() == codec.frames();
         let is_again = kept.is_read_again(entry.id, self.lod);
-        let is_kept = is_again || is_part && is_whole;
-        if !is_kept {
+        let bytes = self.all_voxels(entry)?.iter().product::<usize>() * codec.frames() * codec.sample.size();
+        if !(is_again || is_part && is_whole) || !kept.has_room(bytes) {
             return decode(wanted);
         }
         let (samples, bytes_read) = decode(&WantedFrames::all(codec))?;

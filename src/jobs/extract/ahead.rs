@@ -1,14 +1,17 @@
 //! Pieces of a remote file that are fetched before they are decoded, many in few requests.
 
-use super::{InWindow, Piece};
+use super::{ExtractConfig, InWindow, Piece};
 use wavesplat_core::base::error::Result;
 use wavesplat_engine::file::{CoefficientFile, Prefetch};
 
 /// Fetches what the next pieces need, as many pieces as fit. Returns their number. Does nothing for local files.
-pub(super) fn fetch_ahead(file: &CoefficientFile, channel: usize, pieces: &[Piece]) -> Result<usize> {
+pub(super) fn fetch_ahead(file: &CoefficientFile, config: &ExtractConfig, pieces: &[Piece]) -> Result<usize> {
+    let &ExtractConfig { channel, ref region, .. } = config;
     let Some(mut prefetch) = Prefetch::new(file) else { return Ok(pieces.len()) };
-    let windows = pieces.iter().flat_map(|piece| file.by_window(&piece.frames));
-    prefetch.leaves(windows, channel, &pieces[0].region)?;
+    let mut last = None;
+    let is_next = |frames: &&[usize]| last.replace(file.window_of(frames[0])) != Some(file.window_of(frames[0]));
+    let windows = pieces.iter().flat_map(|piece| file.by_window(&piece.frames)).filter(is_next);
+    prefetch.leaves(windows, channel, region)?;
     let fetched = prefetch.gather(pieces, |piece, prefetch| {
         file.by_window(&piece.frames).try_for_each(|frames| add(prefetch, file, channel, piece, frames))
     })?;

@@ -41,7 +41,7 @@ pub struct ExtractConfig {
     pub channel: usize,
     /// The order of the samples. Default: frame by frame, x fastest.
     pub order: SampleOrder,
-    /// Bytes that may be allocated. Default: 512 MiB.
+    /// Bytes that may be allocated, beside the memory of [`extract_into`]. Default: 512 MiB.
     pub memory: usize,
 }
 
@@ -115,13 +115,16 @@ pub fn extract_to(
     progress: &dyn Progress,
 ) -> Result<ExtractReport> {
     let mut buffers: Vec<Zeroed<u8>> = Vec::new();
-    Extraction::in_order(file, config, Pieces::new(file, config)?).for_each_group(progress, |group, lengths| {
-        buffers.resize_with(lengths.len(), Zeroed::default);
-        let rooms: Vec<&mut [u8]> = buffers.iter_mut().zip(lengths).map(|(buffer, len)| room(buffer, *len)).collect();
-        let read = group.read(rooms)?;
-        buffers.iter().zip(lengths).try_for_each(|(buffer, len)| write(&buffer[..*len]))?;
-        Ok(read)
-    })
+    Extraction::in_order(file, config, Pieces::new(file, config)?)
+        .for_each_group(progress, |group, lengths| {
+            buffers.resize_with(lengths.len(), Zeroed::default);
+            let rooms: Vec<&mut [u8]> =
+                buffers.iter_mut().zip(lengths).map(|(buffer, len)| room(buffer, *len)).collect();
+            let read = group.read(rooms)?;
+            buffers.iter().zip(lengths).try_for_each(|(buffer, len)| write(&buffer[..*len]))?;
+            Ok(read)
+        })
+        .inspect(|_| progress.finish())
 }
 
 /// As [`extract`], to memory, which has room for all samples and no more.
@@ -140,12 +143,14 @@ pub fn extract_into(
     }
     let mut left = out;
     let windows = Pieces { items: [usize::MAX; 2], ..Pieces::new(file, config)? }; // so each block is decoded once
-    Extraction::in_order(file, config, windows).for_each_group(progress, |group, lengths| {
-        let (mut parts, after) = std::mem::take(&mut left).split_at_mut(lengths.iter().sum());
-        left = after;
-        let rooms = lengths.iter().map(|len| parts.split_off_mut(..*len).unwrap_or_default()).collect();
-        group.read(rooms)
-    })
+    Extraction::in_order(file, config, windows)
+        .for_each_group(progress, |group, lengths| {
+            let (mut parts, after) = std::mem::take(&mut left).split_at_mut(lengths.iter().sum());
+            left = after;
+            let rooms = lengths.iter().map(|len| parts.split_off_mut(..*len).unwrap_or_default()).collect();
+            group.read(rooms)
+        })
+        .inspect(|_| progress.finish())
 }
 
 /// The first `len` bytes of a buffer, which is replaced by a longer one if it is too short.
@@ -172,7 +177,8 @@ impl<'a> Extraction<'a> {
         Self { file, config, pieces, list }
     }
 
-    /// Reads all pieces, in groups that are decoded side by side. `read` gets each group and the bytes of each of its pieces.
+    /// Reads all pieces, in groups that are decoded side by side. `read` gets each group and the bytes of each of its pieces. The
+    /// caller finishes the progress.
     fn for_each_group(
         &self,
         progress: &dyn Progress,
@@ -184,14 +190,14 @@ impl<'a> Extraction<'a> {
         let mut report = ExtractReport::default();
         let all = config.bytes(file);
         let (mut begun, mut fetched) = (0, 0);
-        for together in list.chunks(pieces.together(file, &list[0].region)) {
+        for together in list.chunks(pieces.together(file, list)) {
             progress.check()?;
             if fetched < begun + together.len() {
-                fetched = begun + fetch_ahead(file, config.channel, &list[begun..])?;
+                fetched = begun + fetch_ahead(file, config, &list[begun..])?;
             }
             begun += together.len();
             let lengths: Vec<usize> = together.iter().map(|piece| piece.bytes(file)).collect();
-            let group = Group { file, config, pieces: together, blocks: pieces.blocks };
+            let group = Group { file, config, pieces: together, blocks: pieces.blocks, progress };
             let ExtractReport { blocks_read, bytes_read, .. } = read(&group, &lengths)?;
             report.blocks_read += blocks_read;
             report.bytes_read += bytes_read;
@@ -202,7 +208,6 @@ impl<'a> Extraction<'a> {
         }
         file.check_unchanged()?;
         (report.file_bytes_read, report.file_bytes) = (file.bytes_read(), file.bytes());
-        progress.finish();
         Ok(report)
     }
 }
@@ -214,16 +219,61 @@ struct Group<'a> {
     pieces: &'a [Piece],
     /// Blocks that each decodes at a time.
     blocks: usize,
+    /// Tells whether the samples are still wanted.
+    progress: &'a dyn Progress,
 }
 
 impl Group<'_> {
     /// Reads each piece into its room, which has just its size.
     fn read(&self, rooms: Vec<&mut [u8]>) -> Result<ExtractReport> {
-        let read = |(piece, room)| read_piece(self.file, self.config, piece, self.blocks, room);
+        let read = |(piece, room)| self.read_piece(piece, room);
         let read = self.pieces.par_iter().zip(rooms).map(read).collect::<Result<Vec<ExtractReport>>>()?;
         let (blocks_read, bytes_read) =
             read.iter().fold((0, 0), |sum, one| (sum.0 + one.blocks_read, sum.1 + one.bytes_read));
         Ok(ExtractReport { blocks_read, bytes_read, ..ExtractReport::default() })
+    }
+
+    /// Reads the samples of a piece into `out`, which has just their size. Blocks overwrite all of it.
+    fn read_piece(&self, piece: &Piece, out: &mut [u8]) -> Result<ExtractReport> {
+        let mut report = ExtractReport::default();
+        let strides = Strides::new(&self.config.order, piece.frames.len(), &piece.region);
+        let mut first = 0;
+        for frames in self.file.by_window(&piece.frames) {
+            let target = Target { strides, region: piece.region, first };
+            self.read_window(frames, &target, out, &mut report)?;
+            first += frames.len();
+        }
+        Ok(report)
+    }
+
+    /// Reads the samples of a piece in frames of one window.
+    fn read_window(&self, frames: &[usize], target: &Target, out: &mut [u8], report: &mut ExtractReport) -> Result<()> {
+        let (file, at_once) = (self.file, self.blocks);
+        let InWindow { window, codec, wanted } = InWindow::new(file, frames)?;
+        let is_part = target.region != file.grid.whole();
+        let out = Mutex::new(out);
+        let read = |entry: &BlockEntry| {
+            let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
+            let region = file.blocks.region(entry.id.block as usize);
+            let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
+            target.copy(&codec, &wanted.frames, &region, &samples, &mut out);
+            Ok(bytes_read)
+        };
+        for entries in file.entries(window, self.config.channel, &target.region) {
+            let entries = entries?;
+            for group in file.by_shared(&entries) {
+                self.progress.check()?;
+                file.fetch_blocks(&codec, group.iter().copied(), &wanted.coefficients)?;
+                let decoded_now = group.iter().copied().filter(|entry| !file.keeps_samples(entry));
+                file.decode_shared(&codec, decoded_now, &wanted.coefficients)?;
+                let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
+                for some in group.chunks(if is_any { group.len() } else { at_once }) {
+                    report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
+                }
+            }
+            report.blocks_read += entries.len() as u64;
+        }
+        Ok(())
     }
 }
 
@@ -262,10 +312,12 @@ impl Pieces {
         Ok(Self { blocks, room: available, items: [(planes / second.max(1)).max(1), planes.min(second.max(1))] })
     }
 
-    /// Pieces that are decoded side by side: several if each touches few blocks, as the series of a voxel does.
-    fn together(&self, file: &CoefficientFile, region: &Region) -> usize {
-        let touched = file.blocks.touching(region).take(self.blocks).count();
-        (self.blocks / touched.max(1)).max(1)
+    /// Pieces that are decoded side by side: several if each touches few blocks, as the series of a voxel does, and two sets of
+    /// them fit in memory.
+    fn together(&self, file: &CoefficientFile, list: &[Piece]) -> usize {
+        let touched = list.first().map_or(1, |piece| file.blocks.touching(&piece.region).take(self.blocks).count());
+        let largest = list.iter().map(|piece| piece.bytes(file)).max().unwrap_or(0);
+        (self.blocks / touched.max(1)).min(self.room / 2 / largest.max(1)).max(1)
     }
 
     fn list(&self, file: &CoefficientFile, config: &ExtractConfig) -> Vec<Piece> {
@@ -316,25 +368,6 @@ fn block_bytes(file: &CoefficientFile) -> usize {
     file.block_bytes() + file.largest_block() * file.sample().size()
 }
 
-/// Reads the samples of a piece into `out`, which has just their size.
-fn read_piece(
-    file: &CoefficientFile,
-    config: &ExtractConfig,
-    piece: &Piece,
-    at_once: usize,
-    out: &mut [u8],
-) -> Result<ExtractReport> {
-    let mut report = ExtractReport::default();
-    let strides = Strides::new(&config.order, piece.frames.len(), &piece.region);
-    let mut first = 0;
-    for frames in file.by_window(&piece.frames) {
-        let target = Target { strides, region: piece.region, first };
-        read_window(file, config.channel, frames, &target, at_once, out, &mut report)?; // blocks overwrite all of it
-        first += frames.len();
-    }
-    Ok(report)
-}
-
 /// Where samples go in the array of a piece.
 struct Target {
     strides: Strides,
@@ -357,42 +390,6 @@ impl InWindow {
         let wanted = WantedFrames::new(&codec, frames.iter().map(|frame| frame - first).collect());
         Ok(Self { window, codec, wanted })
     }
-}
-
-/// Reads the samples of a piece in frames of one window.
-fn read_window(
-    file: &CoefficientFile,
-    channel: usize,
-    frames: &[usize],
-    target: &Target,
-    at_once: usize,
-    out: &mut [u8],
-    report: &mut ExtractReport,
-) -> Result<()> {
-    let InWindow { window, codec, wanted } = InWindow::new(file, frames)?;
-    let is_part = frames.len() < codec.frames() || target.region != file.grid.whole();
-    let out = Mutex::new(out);
-    let read = |entry: &BlockEntry| {
-        let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
-        let region = file.blocks.region(entry.id.block as usize);
-        let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
-        target.copy(&codec, &wanted.frames, &region, &samples, &mut out);
-        Ok(bytes_read)
-    };
-    for entries in file.entries(window, channel, &target.region) {
-        let entries = entries?;
-        for group in file.by_shared(&entries) {
-            file.fetch_blocks(&codec, group.iter().copied(), &wanted.coefficients)?;
-            let decoded_now = group.iter().copied().filter(|entry| !file.keeps_samples(entry));
-            file.decode_shared(&codec, decoded_now, &wanted.coefficients)?;
-            let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
-            for some in group.chunks(if is_any { group.len() } else { at_once }) {
-                report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
-            }
-        }
-        report.blocks_read += entries.len() as u64;
-    }
-    Ok(())
 }
 
 impl Target {

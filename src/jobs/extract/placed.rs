@@ -15,6 +15,9 @@ use wavesplat_formats::{Direction, OutputAxis};
 /// Preferred bytes of a piece. Smaller ones have shorter runs of samples, and writing many short ones takes longer than decoding.
 const PREFERRED: usize = 64 << 20;
 
+/// Bytes that are worth a call of the system.
+const LEAST_RUN: usize = 1 << 10;
+
 /// As [`super::extract`], to a sink. If that is a plain file, samples are written at their places.
 pub fn extract_to_sink(
     file: &CoefficientFile,
@@ -55,11 +58,13 @@ fn extract_placed(of: &Extraction<'_>, placed: &Placed<'_>, progress: &dyn Progr
         report
     })?;
     write(&read, &full)?;
+    progress.finish();
     Ok(report)
 }
 
 impl Pieces {
-    /// Pieces of whole blocks, with all frames of a window. None if two do not fit in memory.
+    /// Pieces of whole blocks, with all frames of a window. None if two do not fit in memory, or if their samples lie apart in the
+    /// output.
     fn of_blocks(&self, file: &CoefficientFile, config: &ExtractConfig) -> Option<Vec<Piece>> {
         let windows = file.by_window(&config.frames);
         let mut list: Vec<Piece> =
@@ -73,7 +78,9 @@ impl Pieces {
         others.into_iter().for_each(|axis| cut(&mut list, axis, PREFERRED.min(self.room / 2)));
         cut(&mut list, fastest, self.room / 2);
         let largest = list.iter().map(|piece| piece.bytes(file)).max().unwrap_or(0);
-        (2 * largest <= self.room).then_some(list)
+        let shortest =
+            list.iter().map(|piece| Runs::new(config, piece).samples() * file.sample().size()).min().unwrap_or(0);
+        (2 * largest <= self.room && (list.len() == 1 || shortest >= LEAST_RUN)).then_some(list)
     }
 }
 
@@ -113,6 +120,11 @@ struct Run {
     to: usize,
 }
 
+/// The samples along some axes: of all, or of the piece.
+fn product(which: usize, axes: &[Axis]) -> usize {
+    axes.iter().map(|axis| axis.items[which]).product()
+}
+
 impl Runs {
     fn new(config: &ExtractConfig, piece: &Piece) -> Self {
         Self::of(config.order.axes(), &config.frames, &config.region, piece)
@@ -137,10 +149,13 @@ impl Runs {
         (1..4).rev().find(|axis| self.axes[*axis].items[0] != self.axes[*axis].items[1]).unwrap_or(0)
     }
 
+    /// The samples of a run.
+    fn samples(&self) -> usize {
+        product(1, &self.axes[self.along()..])
+    }
+
     fn list(self) -> impl Iterator<Item = Run> {
-        let along = self.along();
-        let product = |which: usize, axes: &[Axis]| axes.iter().map(|axis| axis.items[which]).product::<usize>();
-        let len = product(1, &self.axes[along..]);
+        let (along, len) = (self.along(), self.samples());
         (0..product(1, &self.axes[..along])).map(move |run| {
             let (mut to, mut left) = (self.axes[along].first * product(0, &self.axes[along + 1..]), run);
             for axis in (0..along).rev() {

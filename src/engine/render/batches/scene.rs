@@ -55,8 +55,8 @@ pub trait Scene {
     /// An upper bound of the memory of one decoded block for a batch of `frames` frames, in bytes.
     fn block_bytes(&self, frames: usize, config: &RenderConfig) -> usize;
 
-    /// As [`Self::block_bytes`] for a number of frames, of the blocks that batches of some of these frames read: a scene that
-    /// knows them can state less. All are before the same [`Self::batch_end`].
+    /// As [`Self::block_bytes`], for batches of some of these frames: a scene that knows their blocks can state less. The frames are
+    /// all before the same [`Self::batch_end`]; the result takes the number of frames of a batch.
     ///
     /// # Errors
     /// Any error ends the rendering.

@@ -1,4 +1,4 @@
-//! The memory that the blocks of a file need, found once for all batches.
+//! The memory that the blocks of a file need: bounds for all, and what the directory says of a window.
 
 use super::batch_plan::{SplatSource, are_few, error_planes};
 use crate::file::CoefficientFile;
@@ -137,8 +137,8 @@ impl Stored {
             for entries in file.entries(window, channel, region) {
                 entries?.iter().for_each(|entry| most.add(entry));
             }
-            // A damaged leaf of these is reported when it is needed.
-            for entries in file.entries_above(window, channel, region).flatten() {
+            for entries in file.entries_above(window, channel, region) {
+                let Ok(entries) = entries else { return Ok(Self::at_most(file)) }; // the error is reported if it matters
                 entries.iter().for_each(|entry| most.add(entry));
             }
         }

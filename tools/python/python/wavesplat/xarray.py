@@ -15,7 +15,7 @@ from xarray.core import indexing
 from ._arguments import located
 from ._convert import convert
 from ._description import ROLES, along_axis, array, attributes, kept
-from ._file import CACHE, File, anywhere, open
+from ._file import File, anywhere, open
 
 _COLOURS = ("red", "green", "blue")
 
@@ -67,7 +67,6 @@ class WavesplatBackend(BackendEntrypoint):
         "concat_characters",
         "lod",
         "cache_dir",
-        "cache",
     )
 
     def open_dataset(
@@ -83,13 +82,9 @@ class WavesplatBackend(BackendEntrypoint):
         concat_characters: bool = True,
         lod: int = 0,
         cache_dir: str | os.PathLike[str] | None = None,
-        cache: int = CACHE,
     ) -> xr.Dataset:
-        """The dataset of a file or an address; with ``lod``, every 2**lod-th voxel along each axis.
-
-        ``cache_dir`` and ``cache`` are those of `wavesplat.open`.
-        """
-        file = open(_place(filename_or_obj), lod=lod, cache_dir=cache_dir, cache=cache)
+        """The dataset of a file or an address; with ``lod``, every 2**lod-th voxel along each axis."""
+        file = open(_place(filename_or_obj), lod=lod, cache_dir=cache_dir)
         variables, attrs = _variables(file)
         dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
         variables = {name: var for name, var in variables.items() if name not in dropped}
