@@ -44,15 +44,16 @@ fn read(file: &CoefficientFile, random: &mut Random) -> (Vec<f32>, std::ops::Ran
 
 #[test]
 fn reads_of_a_file_that_keeps_blocks_are_those_of_one_that_does_not() {
-    for stored in files() {
-        let (kept, random) = (ROOMS.map(|room| stored.open().keeping_decoded(room)), &mut Random(9));
-        let (whole, grid) = (extracted(&stored.open()), stored.open().grid.whole());
+    for (stored, lod) in files().iter().flat_map(|stored| [(stored, 0), (stored, 1)]) {
+        let open = || stored.open().with_detail(lod).expect("blocks begin on the lattice");
+        let (kept, random) = (ROOMS.map(|room| open().keeping_decoded(room)), &mut Random(9));
+        let (whole, grid) = (extracted(&open()), open().grid.whole());
         let sample = |frame: usize, voxel| {
             let at = 4 * (frame * grid.voxels() + grid.index(voxel));
             f32::from_le_bytes(whole[at..][..4].try_into().expect("4 bytes"))
         };
         for _ in 0..60 {
-            let (samples, frames, region) = read(&stored.open(), random);
+            let (samples, frames, region) = read(&open(), random);
             let of_whole = frames.clone().flat_map(|frame| region.iter().map(move |voxel| sample(frame, voxel)));
             assert!(samples.iter().copied().eq(of_whole), "{frames:?} {region}");
             for (kept, room) in kept.iter().zip(ROOMS) {

@@ -142,6 +142,13 @@ impl Region {
         self.rows().flat_map(move |(y, z)| x.clone().map(move |x| [x, y, z]))
     }
 
+    /// The region in coordinates that begin at the first voxel of another.
+    pub fn relative_to(&self, other: &Self) -> Self {
+        let [start, end] =
+            [self.start, self.end].map(|at| std::array::from_fn(|a| at[a].saturating_sub(other.start[a])));
+        Self { start, end }
+    }
+
     /// Index of a voxel in the array of this region.
     #[inline]
     pub fn index(&self, voxel: [usize; 3]) -> usize {

@@ -7,10 +7,11 @@
 use super::WindowCodec;
 use super::buffer::Buffer;
 use super::codes::Codes;
-use super::field::{Above, Field, Plane, Stored};
+use super::field::{Above, Field, LONG_RUN, Plane, RUN, Stored};
 use super::rows::Change;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
+use std::ops::Range;
 use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
@@ -322,10 +323,24 @@ impl Block {
         wanted: &WantedFrames,
         visit: impl FnMut(usize, &[f64]),
     ) {
+        let (all, run) = (self.voxels, if codec.scheme.basis == Basis::Samples { LONG_RUN } else { RUN });
+        let runs = (0..all).step_by(run).map(move |first| first..all.min(first + run));
+        self.for_each_run_in(codec, field, &wanted.frames, runs, visit);
+    }
+
+    /// As [`Self::for_each_run_of`], in some runs of voxels.
+    pub(super) fn for_each_run_in(
+        &self,
+        codec: &WindowCodec,
+        field: &Field<'_>,
+        frames: &[usize],
+        runs: impl Iterator<Item = Range<usize>> + Clone,
+        visit: impl FnMut(usize, &[f64]),
+    ) {
         if codec.scheme.basis == Basis::Samples {
-            field.for_each_run_of_samples(self.voxels, &wanted.frames, visit);
+            field.for_each_run_of_samples(self.voxels, frames, &runs, visit);
         } else {
-            field.for_each_run(codec.basis.as_ref(), self.voxels, &wanted.frames, visit);
+            field.for_each_run(codec.basis.as_ref(), self.voxels, frames, runs, visit);
         }
     }
 
@@ -425,7 +440,7 @@ impl Block {
 }
 
 /// Replaces samples below `lo` by it, and those above `hi` by that.
-fn clip(ty: SampleType, lo: f64, hi: f64, samples: &mut [u8]) {
+pub(super) fn clip(ty: SampleType, lo: f64, hi: f64, samples: &mut [u8]) {
     let mut values = vec![0.0; CLIPPED];
     for run in samples.chunks_mut(CLIPPED * ty.size()) {
         let values = &mut values[..run.len() / ty.size()];

@@ -8,6 +8,7 @@ use super::real::Real;
 use super::rows::{self, Change};
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
+use std::ops::Range;
 use wavesplat_format::{EncodedBlock, Pyramid, SparseCodes};
 
 /// The decoded coefficients of a block.
@@ -290,12 +291,13 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Calls `visit(index of the first, values)` for all decoded samples of some frames, a run of voxels at a time.
+    /// Calls `visit(index of the first, values)` for the decoded samples of some frames in runs of voxels, each of at most [`RUN`].
     pub(super) fn for_each_run(
         &self,
         basis: &dyn TimeBasis,
         voxels: usize,
         frames: &[usize],
+        runs: impl Iterator<Item = Range<usize>>,
         mut visit: impl FnMut(usize, &[f64]),
     ) {
         let used = Used::new(basis, &self.marked);
@@ -303,8 +305,8 @@ impl<'a> Field<'a> {
         let basis = some.as_deref().unwrap_or(all);
         let places: Vec<usize> = if some.is_some() { (0..frames.len()).collect() } else { frames.to_vec() };
         let mut run = Run::new(basis, &used.ks);
-        for first in (0..voxels).step_by(RUN) {
-            let count = RUN.min(voxels - first);
+        for Range { start: first, end } in runs {
+            let count = end - first;
             run.load(self, voxels, first, count);
             run.invert(basis, count.div_ceil(LANES));
             for (frame, place) in frames.iter().zip(&places) {
@@ -313,18 +315,19 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// As [`Self::for_each_run`], if the coefficients are the samples.
+    /// As [`Self::for_each_run`], if the coefficients are the samples. Runs have at most [`LONG_RUN`] voxels.
     pub(super) fn for_each_run_of_samples(
         &self,
         voxels: usize,
         frames: &[usize],
+        runs: &(impl Iterator<Item = Range<usize>> + Clone),
         mut visit: impl FnMut(usize, &[f64]),
     ) {
-        let mut run = [0.0; 8 * RUN];
-        for (frame, first) in frames.iter().flat_map(|frame| (0..voxels).step_by(8 * RUN).map(move |at| (frame, at))) {
-            let run = &mut run[..(8 * RUN).min(voxels - first)];
-            self.load(*frame, voxels, first, run);
-            visit(frame * voxels + first, run);
+        let mut values = [0.0; LONG_RUN];
+        for (frame, run) in frames.iter().flat_map(|frame| runs.clone().map(move |run| (frame, run))) {
+            let values = &mut values[..run.len()];
+            self.load(*frame, voxels, run.start, values);
+            visit(frame * voxels + run.start, values);
         }
     }
 
@@ -370,7 +373,10 @@ impl Used {
 }
 
 /// The number of voxels decoded together. Their part of each plane fills whole cache lines.
-const RUN: usize = 128;
+pub(super) const RUN: usize = 128;
+
+/// The largest number of voxels that are loaded together, if coefficients are samples.
+pub(super) const LONG_RUN: usize = 8 * RUN;
 
 /// The series of a run of voxels, in groups of [`LANES`].
 struct Run<'a> {

@@ -17,6 +17,7 @@ pub mod field;
 mod listed;
 mod gain;
 mod load;
+pub mod part;
 pub(crate) mod pyramid;
 pub mod real;
 mod refine;

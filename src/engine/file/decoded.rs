@@ -34,6 +34,8 @@ pub(super) struct DecodedKey {
 pub(super) enum DecodedForm {
     /// The coefficients that are marked, of some parts and, if so, of the nodes above.
     Coefficients { wanted: Vec<bool>, parts: Vec<PartKind>, begins_above: bool },
+    /// All coefficients of the window.
+    All,
     /// All samples of the window.
     Samples,
 }

@@ -4,9 +4,11 @@ use super::coefficient_file::CoefficientFile;
 use super::decoded::{DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey};
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::decode::WantedFrames;
+use wavesplat_core::codec::part::is_divisible;
 use wavesplat_format::BlockEntry;
 
 impl CoefficientFile {
@@ -82,9 +84,54 @@ impl CoefficientFile {
         Ok((samples, bytes_read))
     }
 
-    /// Whether the samples of a block are kept.
+    /// The samples of some frames in a part of a block, frame after frame, x fastest, and the stored bytes read. None if the block is
+    /// not [divisible](is_divisible), if its samples are kept, or if frames repeat. Uses the cache, and adds the block's coefficients.
+    pub fn samples_of_part(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &WantedFrames,
+        part: &Region,
+    ) -> Result<Option<(Vec<u8>, u64)>> {
+        let repeats = wanted.frames.windows(2).any(|two| two[0] == two[1]);
+        if repeats || !is_divisible(codec, entry) || self.keeps(entry, DecodedForm::Samples) {
+            return Ok(None);
+        }
+        let (decoded, bytes_read) = self.all_coefficients(codec, entry, &wanted.coefficients)?;
+        let DecodedBlock { block, field } = decoded.as_ref();
+        let samples = field.as_ref().map(|field| block.samples_of_part(codec, field, &wanted.frames, part));
+        Ok(samples.map(|samples| (samples, bytes_read)))
+    }
+
+    /// A divisible block with its coefficients: all if they are kept, else those that are marked. And the stored bytes read.
+    fn all_coefficients(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+    ) -> Result<(Arc<DecodedBlock>, u64)> {
+        let decode = |wanted: &[bool]| {
+            let block = self.block(codec, entry, wanted)?;
+            let (field, bytes_read) = (Some(block.refined(codec, wanted)), block.bytes_read);
+            Ok((Arc::new(DecodedBlock { block, field }), bytes_read))
+        };
+        let Some(kept) = &self.kept else { return decode(wanted) };
+        let key = self.key(entry, DecodedForm::All);
+        if let Some(decoded) = kept.block(&key) {
+            return Ok((decoded, 0));
+        }
+        let (decoded, bytes_read) = decode(&vec![true; wanted.len()])?;
+        kept.keep_block(key, &decoded);
+        Ok((decoded, bytes_read))
+    }
+
+    /// Whether samples of a block can be read without decoding it.
     pub fn keeps_samples(&self, entry: &BlockEntry) -> bool {
-        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key(entry, DecodedForm::Samples)))
+        self.keeps(entry, DecodedForm::Samples) || self.keeps(entry, DecodedForm::All)
+    }
+
+    fn keeps(&self, entry: &BlockEntry, form: DecodedForm) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key(entry, form)))
     }
 
     /// Whether the coefficients of a block are kept.

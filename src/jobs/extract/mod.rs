@@ -250,13 +250,21 @@ impl Group<'_> {
     fn read_window(&self, frames: &[usize], target: &Target, out: &mut [u8], report: &mut ExtractReport) -> Result<()> {
         let (file, at_once) = (self.file, self.blocks);
         let InWindow { window, codec, wanted } = InWindow::new(file, frames)?;
-        let is_part = target.region != file.grid.whole();
+        let (is_part, numbers) = (target.region != file.grid.whole(), (0..frames.len()).collect::<Vec<usize>>());
         let out = Mutex::new(out);
         let read = |entry: &BlockEntry| {
-            let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
             let region = file.blocks.region(entry.id.block as usize);
-            let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
-            target.copy(&codec, &wanted.frames, &region, &samples, &mut out);
+            let out = || out.lock().unwrap_or_else(PoisonError::into_inner);
+            let shared = region.intersect(&target.region);
+            if shared.voxels() * SMALL_PART <= region.voxels()
+                && let Some((samples, bytes_read)) =
+                    file.samples_of_part(&codec, entry, &wanted, &shared.relative_to(&region))?
+            {
+                target.copy(&codec, &numbers, &shared, &samples, &mut out());
+                return Ok(bytes_read);
+            }
+            let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
+            target.copy(&codec, &wanted.frames, &region, &samples, &mut out());
             Ok(bytes_read)
         };
         for entries in file.entries(window, self.config.channel, &target.region) {
@@ -276,6 +284,9 @@ impl Group<'_> {
         Ok(())
     }
 }
+
+/// Of a part of at most one voxel in so many of a block, no other voxels are decoded to samples.
+const SMALL_PART: usize = 4;
 
 /// The amount decoded at a time: some items of the slowest axis, or one of its items and some items of the second axis.
 struct Pieces {
@@ -393,7 +404,7 @@ impl InWindow {
 }
 
 impl Target {
-    /// Copies the rows shared by a block and the piece.
+    /// Copies the rows shared by a block, or a part of it, and the piece. `frames` are the numbers of the frames in `samples`.
     fn copy(&self, codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], out: &mut [u8]) {
         let (size, shared) = (codec.sample.size(), block.intersect(&self.region));
         let ([nx, ny, nz], [bx, by, _]) = (shared.dims(), block.dims());

@@ -15,9 +15,6 @@ use wavesplat_formats::{Direction, OutputAxis};
 /// Preferred bytes of a piece. Smaller ones have shorter runs of samples, and writing many short ones takes longer than decoding.
 const PREFERRED: usize = 64 << 20;
 
-/// Bytes that are worth a call of the system.
-const LEAST_RUN: usize = 1 << 10;
-
 /// As [`super::extract`], to a sink. If that is a plain file, samples are written at their places.
 pub fn extract_to_sink(
     file: &CoefficientFile,
@@ -63,38 +60,36 @@ fn extract_placed(of: &Extraction<'_>, placed: &Placed<'_>, progress: &dyn Progr
 }
 
 impl Pieces {
-    /// Pieces of whole blocks, with all frames of a window. None if two do not fit in memory, or if their samples lie apart in the
-    /// output.
+    /// Pieces of whole blocks, with all frames of a window. None if two do not fit in memory.
     fn of_blocks(&self, file: &CoefficientFile, config: &ExtractConfig) -> Option<Vec<Piece>> {
         let windows = file.by_window(&config.frames);
         let mut list: Vec<Piece> =
             windows.map(|frames| Piece { frames: frames.to_vec(), region: config.region }).collect();
         let [others @ .., fastest] = config.order.axes();
-        let cut = |list: &mut Vec<Piece>, axis: OutputAxis, most: usize| {
-            if let Some(axis) = axis.voxels().filter(|_| list.iter().any(|piece| piece.bytes(file) > most)) {
-                *list = list.iter().flat_map(|piece| piece.by_blocks(file, axis)).collect();
-            }
-        };
-        others.into_iter().for_each(|axis| cut(&mut list, axis, PREFERRED.min(self.room / 2)));
-        cut(&mut list, fastest, self.room / 2);
+        let preferred = PREFERRED.min(self.room / 2);
+        // Runs are long where the fastest axis is whole.
+        let limits = others.map(|axis| (axis, preferred)).into_iter().chain([(fastest, self.room / 2)]);
+        for (axis, most) in limits.filter_map(|(axis, most)| Some((axis.voxels()?, most))) {
+            list = list.iter().flat_map(|piece| piece.by_blocks(file, axis, most)).collect();
+        }
         let largest = list.iter().map(|piece| piece.bytes(file)).max().unwrap_or(0);
-        let shortest =
-            list.iter().map(|piece| Runs::new(config, piece).samples() * file.sample().size()).min().unwrap_or(0);
-        (2 * largest <= self.room && (list.len() == 1 || shortest >= LEAST_RUN)).then_some(list)
+        (2 * largest <= self.room).then_some(list)
     }
 }
 
 impl Piece {
-    /// Cuts the piece along an axis between blocks.
-    fn by_blocks(&self, file: &CoefficientFile, axis: usize) -> impl Iterator<Item = Self> {
+    /// Cuts the piece along an axis between blocks, into pieces of `most` bytes, or of one block if that has more.
+    fn by_blocks(&self, file: &CoefficientFile, axis: usize, most: usize) -> Vec<Self> {
         let (whole, edge) = (self.region, file.blocks.edges[axis]);
-        let [first, end] = [whole.start[axis] / edge, whole.end[axis].div_ceil(edge)];
-        (first..end).map(move |block| {
+        let of_edge = self.bytes(file) / whole.dims()[axis] * edge;
+        let step = if self.bytes(file) <= most { whole.end[axis] } else { edge * (most / of_edge).max(1) };
+        let piece = |first: usize| {
             let mut region = whole;
-            region.start[axis] = whole.start[axis].max(block * edge);
-            region.end[axis] = whole.end[axis].min((block + 1) * edge);
+            region.start[axis] = whole.start[axis].max(first);
+            region.end[axis] = whole.end[axis].min(first + step);
             Self { frames: self.frames.clone(), region }
-        })
+        };
+        (whole.start[axis] / edge * edge..whole.end[axis]).step_by(step).map(piece).collect()
     }
 }
 
