@@ -310,7 +310,7 @@ impl<'a> Field<'a> {
             run.load(self, voxels, first, count);
             run.invert(basis, count.div_ceil(LANES));
             for (frame, place) in frames.iter().zip(&places) {
-                visit(frame * voxels + first, &run.frame(*place)[..count]);
+                visit(frame * voxels + first, run.frame(*place, count));
             }
         }
     }
@@ -400,7 +400,8 @@ impl<'a> Run<'a> {
         for (i, k) in self.ks.iter().enumerate() {
             field.load(*k, voxels, first, &mut self.row[..count]);
             let of_k = self.coefficients[i..].iter_mut().step_by(self.ks.len());
-            of_k.zip(self.row.as_chunks::<LANES>().0).for_each(|(lane, row)| *lane = *row);
+            let rows = self.row.as_chunks::<LANES>().0.iter().take(count.div_ceil(LANES));
+            of_k.zip(rows).for_each(|(lane, row)| *lane = *row);
         }
     }
 
@@ -411,11 +412,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn frame(&mut self, frame: usize) -> &[f64; RUN] {
+    fn frame(&mut self, frame: usize, count: usize) -> &[f64] {
         let each = self.series.len() / (RUN / LANES);
-        let of_frame = self.series[frame..].iter().step_by(each);
+        let of_frame = self.series[frame..].iter().step_by(each).take(count.div_ceil(LANES));
         self.row.as_chunks_mut::<LANES>().0.iter_mut().zip(of_frame).for_each(|(row, lane)| *row = *lane);
-        &self.row
+        &self.row[..count]
     }
 }
 

@@ -5,6 +5,7 @@ use super::decode::{Block, clip};
 use super::field::{Field, RUN};
 use crate::base::grid::Region;
 use crate::base::sample;
+use crate::wavelet::LANES;
 use std::ops::Range;
 use wavesplat_format::{BlockEntry, PartKind};
 
@@ -13,6 +14,12 @@ use wavesplat_format::{BlockEntry, PartKind};
 pub fn is_divisible(codec: &WindowCodec, entry: &BlockEntry) -> bool {
     let is_coded = |kind: PartKind| matches!(kind, PartKind::Level(_) | PartKind::Outliers);
     codec.scheme.pyramid.is_some() && !entry.lost && entry.parts.iter().all(|part| is_coded(part.kind))
+}
+
+/// The voxels that are decoded for a part: rows in whole groups.
+pub fn decoded_together(part: &Region) -> usize {
+    let [x, y, z] = part.dims();
+    x.next_multiple_of(LANES) * y * z
 }
 
 impl Block {

@@ -8,8 +8,14 @@ use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::decode::WantedFrames;
-use wavesplat_core::codec::part::is_divisible;
+use wavesplat_core::codec::part::{decoded_together, is_divisible};
 use wavesplat_format::BlockEntry;
+
+/// A part is small if decoding it takes the time of at most one voxel in so many of a block.
+const SMALL: usize = 4;
+
+/// The same of a part that is read from coefficients however often it is read.
+const TINY: usize = 64;
 
 impl CoefficientFile {
     /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
@@ -84,8 +90,9 @@ impl CoefficientFile {
         Ok((samples, bytes_read))
     }
 
-    /// The samples of some frames in a part of a block, frame after frame, x fastest, and the stored bytes read. None if the block is
-    /// not [divisible](is_divisible), if its samples are kept, or if frames repeat. Uses the cache, and adds the block's coefficients.
+    /// The samples of some frames in a part of a block, frame after frame, x fastest, and the stored bytes read. None if the part is
+    /// not small, the block not [divisible](is_divisible), or its samples are kept, and if frames repeat. Uses the cache, and adds the
+    /// block's coefficients as [`Self::samples`] adds samples.
     pub fn samples_of_part(
         &self,
         codec: &WindowCodec,
@@ -94,21 +101,29 @@ impl CoefficientFile {
         part: &Region,
     ) -> Result<Option<(Vec<u8>, u64)>> {
         let repeats = wanted.frames.windows(2).any(|two| two[0] == two[1]);
-        if repeats || !is_divisible(codec, entry) || self.keeps(entry, DecodedForm::Samples) {
+        let voxels: usize = codec.decoded_size(self.all_voxels(entry)?).iter().product();
+        let cost = decoded_together(part);
+        if repeats || SMALL * cost > voxels || !is_divisible(codec, entry) || self.keeps(entry, DecodedForm::Samples) {
             return Ok(None);
         }
-        let (decoded, bytes_read) = self.all_coefficients(codec, entry, &wanted.coefficients)?;
+        let is_again = self.kept.as_ref().is_some_and(|kept| kept.is_read_again(entry.id, self.lod));
+        if is_again && TINY * cost > voxels {
+            return Ok(None); // several such parts take longer than all samples
+        }
+        let (decoded, bytes_read) = self.coefficients_of(codec, entry, &wanted.coefficients, is_again)?;
         let DecodedBlock { block, field } = decoded.as_ref();
         let samples = field.as_ref().map(|field| block.samples_of_part(codec, field, &wanted.frames, part));
         Ok(samples.map(|samples| (samples, bytes_read)))
     }
 
-    /// A divisible block with its coefficients: all if they are kept, else those that are marked. And the stored bytes read.
-    fn all_coefficients(
+    /// A divisible block with its coefficients, at least those that are marked, and the stored bytes read. All are kept if all are
+    /// marked or the block is read again, and if there is room.
+    fn coefficients_of(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
         wanted: &[bool],
+        is_again: bool,
     ) -> Result<(Arc<DecodedBlock>, u64)> {
         let decode = |wanted: &[bool]| {
             let block = self.block(codec, entry, wanted)?;
@@ -119,6 +134,10 @@ impl CoefficientFile {
         let key = self.key(entry, DecodedForm::All);
         if let Some(decoded) = kept.block(&key) {
             return Ok((decoded, 0));
+        }
+        let bytes = self.all_voxels(entry)?.iter().product::<usize>() * wanted.len() * self.coefficient_size();
+        if !(is_again || wanted.iter().all(|wanted| *wanted)) || !kept.has_room(bytes) {
+            return decode(wanted);
         }
         let (decoded, bytes_read) = decode(&vec![true; wanted.len()])?;
         kept.keep_block(key, &decoded);

@@ -256,10 +256,8 @@ impl Group<'_> {
             let region = file.blocks.region(entry.id.block as usize);
             let out = || out.lock().unwrap_or_else(PoisonError::into_inner);
             let shared = region.intersect(&target.region);
-            if shared.voxels() * SMALL_PART <= region.voxels()
-                && let Some((samples, bytes_read)) =
-                    file.samples_of_part(&codec, entry, &wanted, &shared.relative_to(&region))?
-            {
+            let part = shared.relative_to(&region);
+            if let Some((samples, bytes_read)) = file.samples_of_part(&codec, entry, &wanted, &part)? {
                 target.copy(&codec, &numbers, &shared, &samples, &mut out());
                 return Ok(bytes_read);
             }
@@ -284,9 +282,6 @@ impl Group<'_> {
         Ok(())
     }
 }
-
-/// Of a part of at most one voxel in so many of a block, no other voxels are decoded to samples.
-const SMALL_PART: usize = 4;
 
 /// The amount decoded at a time: some items of the slowest axis, or one of its items and some items of the second axis.
 struct Pieces {
