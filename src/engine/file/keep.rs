@@ -11,10 +11,10 @@ use wavesplat_core::codec::decode::WantedFrames;
 use wavesplat_core::codec::part::{decoded_together, is_divisible};
 use wavesplat_format::BlockEntry;
 
-/// A part is small if decoding it takes the time of at most one voxel in so many of a block.
+/// A small part takes the time of at most one voxel in so many of a block.
 const SMALL: usize = 4;
 
-/// The same of a part that is read from coefficients however often it is read.
+/// A tiny part takes the time of at most one in so many: it is decoded from coefficients even if its block is read often.
 const TINY: usize = 64;
 
 impl CoefficientFile {
@@ -81,7 +81,7 @@ impl CoefficientFile {
         }
         let is_whole = wanted.frames.len() == codec.frames();
         let is_again = kept.is_read_again(entry.id, self.lod);
-        let bytes = self.all_voxels(entry)?.iter().product::<usize>() * codec.frames() * codec.sample.size();
+        let bytes = self.decoded_voxels(codec, entry)? * codec.frames() * codec.sample.size();
         if !(is_again || is_part && is_whole) || !kept.has_room(bytes) {
             return decode(wanted);
         }
@@ -101,7 +101,7 @@ impl CoefficientFile {
         part: &Region,
     ) -> Result<Option<(Vec<u8>, u64)>> {
         let repeats = wanted.frames.windows(2).any(|two| two[0] == two[1]);
-        let voxels: usize = codec.decoded_size(self.all_voxels(entry)?).iter().product();
+        let voxels = self.decoded_voxels(codec, entry)?;
         let cost = decoded_together(part);
         if repeats || SMALL * cost > voxels || !is_divisible(codec, entry) || self.keeps(entry, DecodedForm::Samples) {
             return Ok(None);
@@ -135,13 +135,18 @@ impl CoefficientFile {
         if let Some(decoded) = kept.block(&key) {
             return Ok((decoded, 0));
         }
-        let bytes = self.all_voxels(entry)?.iter().product::<usize>() * wanted.len() * self.coefficient_size();
+        let bytes = self.decoded_voxels(codec, entry)? * wanted.len() * self.coefficient_size();
         if !(is_again || wanted.iter().all(|wanted| *wanted)) || !kept.has_room(bytes) {
             return decode(wanted);
         }
         let (decoded, bytes_read) = decode(&vec![true; wanted.len()])?;
         kept.keep_block(key, &decoded);
         Ok((decoded, bytes_read))
+    }
+
+    /// The voxels of a block that are decoded at the level of detail.
+    fn decoded_voxels(&self, codec: &WindowCodec, entry: &BlockEntry) -> Result<usize> {
+        Ok(codec.decoded_size(self.all_voxels(entry)?).iter().product())
     }
 
     /// Whether samples of a block can be read without decoding it.

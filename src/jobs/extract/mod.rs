@@ -117,10 +117,7 @@ pub fn extract_to(
     let mut buffers: Vec<Zeroed<u8>> = Vec::new();
     Extraction::in_order(file, config, Pieces::new(file, config)?)
         .for_each_group(progress, |group, lengths| {
-            buffers.resize_with(lengths.len(), Zeroed::default);
-            let rooms: Vec<&mut [u8]> =
-                buffers.iter_mut().zip(lengths).map(|(buffer, len)| room(buffer, *len)).collect();
-            let read = group.read(rooms)?;
+            let read = group.read(rooms(&mut buffers, lengths))?;
             buffers.iter().zip(lengths).try_for_each(|(buffer, len)| write(&buffer[..*len]))?;
             Ok(read)
         })
@@ -151,6 +148,12 @@ pub fn extract_into(
             group.read(rooms)
         })
         .inspect(|_| progress.finish())
+}
+
+/// The first bytes of some buffers, as many buffers as there are lengths.
+fn rooms<'a>(buffers: &'a mut Vec<Zeroed<u8>>, lengths: &[usize]) -> Vec<&'a mut [u8]> {
+    buffers.resize_with(lengths.len(), Zeroed::default);
+    buffers.iter_mut().zip(lengths).map(|(buffer, len)| room(buffer, *len)).collect()
 }
 
 /// The first `len` bytes of a buffer, which is replaced by a longer one if it is too short.

@@ -2,7 +2,7 @@
 //! are in memory than those of some blocks.
 
 use super::sink::Sink;
-use super::{ExtractConfig, ExtractReport, Extraction, Piece, Pieces, extract_to, length, room};
+use super::{ExtractConfig, ExtractReport, Extraction, Piece, Pieces, extract_to, length, rooms};
 use std::ops::Range;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
@@ -46,8 +46,7 @@ fn extract_placed(of: &Extraction<'_>, placed: &Placed<'_>, progress: &dyn Progr
     let (mut buffers, mut full): (Vec<Zeroed<u8>>, Vec<Zeroed<u8>>) = Default::default();
     let mut read: Vec<Piece> = Vec::new();
     let report = of.for_each_group(progress, |group, lengths| {
-        buffers.resize_with(lengths.len(), Zeroed::default);
-        let rooms: Vec<&mut [u8]> = buffers.iter_mut().zip(lengths).map(|(buffer, len)| room(buffer, *len)).collect();
+        let rooms = rooms(&mut buffers, lengths);
         let (written, report) = rayon::join(|| write(&read, &full), || group.read(rooms));
         written?;
         std::mem::swap(&mut buffers, &mut full);
@@ -102,9 +101,11 @@ struct Runs {
 /// An axis of the output.
 #[derive(Debug, Clone, Copy)]
 struct Axis {
-    /// Items of all samples, and of the piece.
-    items: [usize; 2],
-    /// The first item of the piece.
+    /// Its items.
+    all: usize,
+    /// Those of the piece.
+    part: usize,
+    /// The first of these.
     first: usize,
 }
 
@@ -115,9 +116,14 @@ struct Run {
     to: usize,
 }
 
-/// The samples along some axes: of all, or of the piece.
-fn product(which: usize, axes: &[Axis]) -> usize {
-    axes.iter().map(|axis| axis.items[which]).product()
+/// The samples along some axes.
+fn all(axes: &[Axis]) -> usize {
+    axes.iter().map(|axis| axis.all).product()
+}
+
+/// The samples of the piece along some axes.
+fn of_part(axes: &[Axis]) -> usize {
+    axes.iter().map(|axis| axis.part).product()
 }
 
 impl Runs {
@@ -132,30 +138,27 @@ impl Runs {
             OutputAxis::Voxels(axis, Direction::Ascending) => piece.region.start[axis] - region.start[axis],
             OutputAxis::Voxels(axis, Direction::Descending) => region.end[axis] - piece.region.end[axis],
         };
-        let axis = |axis| {
-            let items = [length(axis, frames.len(), region), length(axis, piece.frames.len(), &piece.region)];
-            Axis { items, first: first(axis) }
+        let axis = |axis| Axis {
+            all: length(axis, frames.len(), region),
+            part: length(axis, piece.frames.len(), &piece.region),
+            first: first(axis),
         };
         Self { axes: axes.map(axis) }
     }
 
     /// The axis along which a run goes; all faster axes are whole.
     fn along(&self) -> usize {
-        (1..4).rev().find(|axis| self.axes[*axis].items[0] != self.axes[*axis].items[1]).unwrap_or(0)
-    }
-
-    /// The samples of a run.
-    fn samples(&self) -> usize {
-        product(1, &self.axes[self.along()..])
+        (1..4).rev().find(|axis| self.axes[*axis].all != self.axes[*axis].part).unwrap_or(0)
     }
 
     fn list(self) -> impl Iterator<Item = Run> {
-        let (along, len) = (self.along(), self.samples());
-        (0..product(1, &self.axes[..along])).map(move |run| {
-            let (mut to, mut left) = (self.axes[along].first * product(0, &self.axes[along + 1..]), run);
+        let along = self.along();
+        let len = of_part(&self.axes[along..]);
+        (0..of_part(&self.axes[..along])).map(move |run| {
+            let (mut to, mut left) = (self.axes[along].first * all(&self.axes[along + 1..]), run);
             for axis in (0..along).rev() {
-                let Axis { items: [_, part], first } = self.axes[axis];
-                to += (first + left % part) * product(0, &self.axes[axis + 1..]);
+                let Axis { part, first, .. } = self.axes[axis];
+                to += (first + left % part) * all(&self.axes[axis + 1..]);
                 left /= part;
             }
             Run { from: run * len..(run + 1) * len, to }

@@ -22,8 +22,8 @@ pub(super) struct ViewGroup<'a> {
 pub(super) type Finish<'a, T> = dyn Fn(usize, ResolvedTile<'_>, &mut Pixels<'_, T>) + Sync + 'a;
 
 impl ViewGroup<'_> {
-    /// Splats all planes of a batch within a budget. `finish(view, tile, pixels)` makes pixels of the sums of a tile; a view has one buffer
-    /// for all its pictures.
+    /// Splats all planes of a batch within a budget. `finish(view, tile, pixels)` makes pixels of the sums of a tile; a view has
+    /// one buffer for all its pictures.
     pub(super) fn splat<T: Send, P: DerefMut<Target = [T]>>(
         &self,
         batch: &dyn FrameBatch,

@@ -43,9 +43,8 @@ impl CoefficientScene {
     /// later windows as fit.
     fn fetch_ahead(&mut self, request: &BatchRequest<'_>) -> Result<()> {
         let (channel, config) = (request.channel, request.config);
-        let Some(mut prefetch) = self.prefetch(channel, request.frames) else { return Ok(()) };
+        let Some(mut prefetch) = self.fetch_leaves(channel, request.frames, config)? else { return Ok(()) };
         let later = later(request.frames, config);
-        prefetch.leaves(self.file.by_window(later), channel, &self.region(config))?;
         let mut fetched = self.fetched[channel];
         prefetch.gather(self.file.by_window(later), |frames, prefetch| {
             // In other modes, which blocks are hidden is known later.
@@ -65,9 +64,14 @@ impl CoefficientScene {
         Ok(())
     }
 
-    /// What fetches parts of a remote file, unless those for some frames were fetched.
-    fn prefetch(&self, channel: usize, frames: &[usize]) -> Option<Prefetch<'_>> {
-        Prefetch::new(&self.file).filter(|_| self.fetched[channel] <= frames[0])
+    /// Fetches the leaves of a remote file for some frames and later ones, and returns what fetches their parts. None if the parts of
+    /// these frames were fetched.
+    fn fetch_leaves(&self, channel: usize, frames: &[usize], config: &RenderConfig) -> Result<Option<Prefetch<'_>>> {
+        let prefetch = Prefetch::new(&self.file).filter(|_| self.fetched[channel] <= frames[0]);
+        if let Some(prefetch) = &prefetch {
+            prefetch.leaves(self.file.by_window(later(frames, config)), channel, &self.region(config))?;
+        }
+        Ok(prefetch)
     }
 
     /// The voxels that are wanted.
@@ -128,9 +132,7 @@ impl Scene for CoefficientScene {
     fn block_bytes_of(&mut self, frames: &[usize], config: &RenderConfig) -> Result<Box<BlockBytes>> {
         let (window, region) = (self.file.window_of(frames[0]), self.region(config));
         for channel in 0..self.file.channels() {
-            if let Some(prefetch) = self.prefetch(channel, frames) {
-                prefetch.leaves(self.file.by_window(later(frames, config)), channel, &region)?;
-            }
+            self.fetch_leaves(channel, frames, config)?;
         }
         let needs = self.needs.of_window(&self.file, window, &region)?.clone();
         let asked: Vec<usize> = self.file.by_window(&config.frames).map(<[usize]>::len).collect();

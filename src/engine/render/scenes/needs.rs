@@ -11,7 +11,6 @@ use wavesplat_format::{Axis, BlockEntry, LeafEntry, PartKind, Window};
 pub(super) struct FileNeeds {
     /// Each kind of window once.
     windows: Vec<WindowKind>,
-    what: SplatSource,
     block: BlockNeeds,
     /// The blocks of a region in one window, the last one that was asked for.
     last: Option<(u32, Region, BlockNeeds)>,
@@ -74,7 +73,7 @@ impl FileNeeds {
         windows.sort_unstable();
         windows.dedup();
         let block = BlockNeeds::new(file, what, &Stored::at_most(file));
-        Self { windows, what, block, last: None }
+        Self { windows, block, last: None }
     }
 
     /// Upper bounds for all blocks.
@@ -85,7 +84,7 @@ impl FileNeeds {
     /// Upper bounds for the blocks of a region in a window, as the directory lists them.
     pub(super) fn of_window(&mut self, file: &CoefficientFile, window: u32, region: &Region) -> Result<&BlockNeeds> {
         if !self.last.as_ref().is_some_and(|(of, within, _)| (*of, within) == (window, region)) {
-            let needs = BlockNeeds::new(file, self.what, &Stored::in_window(file, window, region)?);
+            let needs = BlockNeeds::new(file, self.block.what, &Stored::in_window(file, window, region)?);
             self.last = Some((window, *region, needs));
         }
         Ok(self.last.as_ref().map_or(&self.block, |(_, _, needs)| needs))
