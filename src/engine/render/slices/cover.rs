@@ -130,12 +130,9 @@ impl Rays {
         (meeting.covered > 0.0).then_some(meeting)
     }
 
-    /// Marks the cells in which one of the surfaces may show between two slices.
-    pub(super) fn near(&self, values: &[f32], from: &Slope, to: &Slope) -> [bool; GROUP] {
-        values.iter().fold([false; GROUP], |marked, value| {
-            let near = dispatch!(near(from, to, *value, self));
-            std::array::from_fn(|i| marked[i] || near[i])
-        })
+    /// Marks the cells in which one of the surfaces may show between two slices: cell i by bit i.
+    pub(super) fn near(&self, values: &[f32], from: &Slope, to: &Slope) -> u32 {
+        dispatch!(near(from, to, values, self))
     }
 
     /// The share of a cell that a surface covers if the ray turns back at `height` beyond it. The height is negative if
@@ -184,22 +181,28 @@ fn turning_value(from: &CoverPoint, to: &CoverPoint, rises: [f32; 2], share: f32
     ends + length * share * rest * (rest * rises[0] - share * rises[1])
 }
 
-/// Whether a value may be passed, or almost reached, between two slices.
+/// Marks the cells where one of the values may be passed, or almost reached, between two slices.
 #[inline(always)]
-fn near(from: &Slope, to: &Slope, value: f32, rays: &Rays) -> [bool; GROUP] {
-    let mut marks = [false; GROUP];
-    for (i, mark) in marks.iter_mut().enumerate() {
+fn near(from: &Slope, to: &Slope, values: &[f32], rays: &Rays) -> u32 {
+    let (mut reached, mut is_near) = ([0.0; GROUP], [false; GROUP]);
+    for i in 0..GROUP {
         let [first, last] = [from, to].map(|slope| {
             slope.gradient[2][i] + rays.direction[0] * slope.gradient[0][i] + rays.direction[1] * slope.gradient[1][i]
         });
-        let across = |slope: &Slope| slope.gradient[0][i].abs() + slope.gradient[1][i].abs();
+        let [one, other] = [from, to].map(|slope| slope.gradient[0][i].abs() + slope.gradient[1][i].abs());
+        let across = if one > other { one } else { other };
         // The height at which a ray turns back, and what the next cell may be higher.
-        let reached = 0.5 * rays.between * (first.abs() + last.abs()) + 0.5 * rays.width * across(from).max(across(to));
-        let (a, b) = (from.values[i] - value, to.values[i] - value);
-        let turns = first * last < 0.0 && a.abs().min(b.abs()) <= reached;
-        *mark = turns || (a < 0.0) != (b < 0.0);
+        let height = 0.5 * rays.between * (first.abs() + last.abs()) + 0.5 * rays.width * across;
+        reached[i] = if first * last < 0.0 { height } else { -1.0 };
     }
-    marks
+    for value in values {
+        for i in 0..GROUP {
+            let (a, b) = (from.values[i] - value, to.values[i] - value);
+            let least = if a.abs() < b.abs() { a.abs() } else { b.abs() };
+            is_near[i] |= (least <= reached[i]) | ((a < 0.0) != (b < 0.0));
+        }
+    }
+    (0..GROUP).fold(0, |marks, i| marks | u32::from(is_near[i]) << i)
 }
 
 /// Half, and a number of widths more; from 0 to 1.
@@ -242,7 +245,8 @@ mod tests {
             let (from, to) = (random.slope(3.0), random.slope(3.0));
             let values = [random.next(), 2.0 * random.next()];
             let marks = rays.near(&values, &from, &to);
-            for (i, mark) in marks.into_iter().enumerate() {
+            for i in 0..GROUP {
+                let mark = marks >> i & 1 == 1;
                 let [first, last] = [[9.0; 3], [9.0, 9.0, 9.0 + between]];
                 let met = |value: &f32| rays.meeting(*value, &from.point(i, first), &to.point(i, last)).is_some();
                 let any = values.iter().any(met);

@@ -96,9 +96,9 @@ impl Blend for Isosurfaces {
         for (n, (group, limit)) in states.iter_mut().zip(limits).enumerate().filter(|(n, _)| live[*n]) {
             let next = dispatch!(slope(row, n));
             let follows = group.slice.wrapping_add(1) == row.slice;
-            let marked = if follows { self.rays.near(&self.values, &group.last, &next) } else { [false; GROUP] };
-            if marked.contains(&true) {
-                for i in (0..GROUP).filter(|i| marked[*i]) {
+            let marks = if follows { self.rays.near(&self.values, &group.last, &next) } else { 0 };
+            if marks != 0 {
+                for i in (0..GROUP).filter(|i| marks >> i & 1 == 1) {
                     let [b, c, a] = row.place;
                     let at = [b + (n * GROUP + i) as f32, c, a];
                     let before = std::array::from_fn(|axis| at[axis] - self.rays.between * self.rays.direction[axis]);

@@ -55,21 +55,12 @@ impl Shader {
     /// The light of sixteen cells with these gradients per voxel (eq 42).
     #[inline(always)]
     pub(super) fn shade(&self, gradient: &[Sixteen; 3]) -> Lit {
-        let Light { ambient, diffuse, specular, .. } = self.light;
-        let (ambient, diffuse, specular) = (ambient as f32, diffuse as f32, specular as f32);
-        let (mut colour, mut gloss) = ([1.0; GROUP], [0.0; GROUP]);
+        let mut lit = Lit { colour: [1.0; GROUP], gloss: [0.0; GROUP] };
         let [b, c, a] = gradient;
         for i in 0..GROUP {
-            let slope = [b[i] * self.per[0], c[i] * self.per[1], a[i] * self.per[2]];
-            let square = dot(slope, slope);
-            let length = square.max(f32::MIN_POSITIVE).sqrt();
-            let turned = if dot(slope, self.to_viewer) < 0.0 { -1.0 } else { 1.0 } / length;
-            let lamp = (dot(slope, self.to_lamp) * turned).max(0.0);
-            let share = square / (square + self.faint).max(f32::MIN_POSITIVE);
-            colour[i] = 1.0 + share * (ambient + diffuse * lamp - 1.0);
-            gloss[i] = share * specular * thirty_second((dot(slope, self.to_middle) * turned).max(0.0));
+            [lit.colour[i], lit.gloss[i]] = self.shade_cell([b[i], c[i], a[i]]);
         }
-        Lit { colour, gloss }
+        lit
     }
 
     /// The same for one gradient.
@@ -77,8 +68,21 @@ impl Shader {
         // A direction of the middle size of numbers: squares of others may not be numbers.
         let most = gradient.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
         let scaled = if self.faint == 0.0 && most > 0.0 { gradient.map(|n| n / most) } else { gradient };
-        let lit = self.shade(&scaled.map(|n| [n as f32; GROUP]));
-        [f64::from(lit.colour[0]), f64::from(lit.gloss[0])]
+        self.shade_cell(scaled.map(|n| n as f32)).map(f64::from)
+    }
+
+    #[inline(always)]
+    fn shade_cell(&self, gradient: [f32; 3]) -> [f32; 2] {
+        let Light { ambient, diffuse, specular, .. } = self.light;
+        let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
+        let slope = [gradient[0] * self.per[0], gradient[1] * self.per[1], gradient[2] * self.per[2]];
+        let square = dot(slope, slope);
+        let length = square.max(f32::MIN_POSITIVE).sqrt();
+        let turned = if dot(slope, self.to_viewer) < 0.0 { -1.0 } else { 1.0 } / length;
+        let lamp = (dot(slope, self.to_lamp) * turned).max(0.0);
+        let share = square / (square + self.faint).max(f32::MIN_POSITIVE);
+        let gloss = share * specular * thirty_second((dot(slope, self.to_middle) * turned).max(0.0));
+        [1.0 + share * (ambient + diffuse * lamp - 1.0), gloss]
     }
 }
 
