@@ -20,12 +20,19 @@ const LARGE: usize = 4 << 20;
 impl<T: Pod> Zeroed<T> {
     /// A buffer of `len` zeros.
     pub fn new(len: usize) -> Self {
+        let zeros = Self::in_small_pages(len);
+        #[cfg(target_os = "linux")]
+        if let Self::Map(map, _) = &zeros {
+            let _ = map.advise(memmap2::Advice::HugePage); // advice only: a system without huge pages is slower
+        }
+        zeros
+    }
+
+    /// The same in small pages, for a buffer of which little is written.
+    pub fn in_small_pages(len: usize) -> Self {
         let bytes = len * size_of::<T>();
         let map = if bytes >= LARGE { MmapMut::map_anon(bytes).ok() } else { None };
-        let Some(map) = map else { return Self::Heap(vec![T::zeroed(); len]) };
-        #[cfg(target_os = "linux")]
-        let _ = map.advise(memmap2::Advice::HugePage); // advice only: a system without huge pages is slower
-        Self::Map(map, len)
+        map.map_or_else(|| Self::Heap(vec![T::zeroed(); len]), |map| Self::Map(map, len))
     }
 
     /// Sets every byte of all numbers.

@@ -12,22 +12,35 @@ pub struct Buffer<T: Pooled> {
     /// At least `len` values; the rest has been used before.
     values: Zeroed<T>,
     len: usize,
+    /// Whether the memory goes back to the system instead: later buffers would be slower in small pages.
+    is_in_small_pages: bool,
 }
 
 impl<T: Pooled> Buffer<T> {
     /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and at most twice
     /// as long, or a new one.
     pub fn with_len(len: usize) -> Self {
+        Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
+    }
+
+    /// The same for a slice of which few entries are used: those of fresh memory that are not cost nothing.
+    pub fn for_part(len: usize) -> Self {
+        Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
+    }
+
+    fn take_spare(len: usize) -> Option<Self> {
         let mut spare = spare::<T>();
-        let fits =
-            (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len())).min_by_key(|n| spare[*n].len());
-        let values = fits.map(|n| spare.swap_remove(n));
+        let fits = (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len()));
+        let values = fits.min_by_key(|n| spare[*n].len()).map(|n| spare.swap_remove(n));
         drop(spare);
-        let mut values = values.unwrap_or_else(|| Zeroed::new(len));
+        values.map(|values| Self::new(values, len, false))
+    }
+
+    fn new(mut values: Zeroed<T>, len: usize, is_in_small_pages: bool) -> Self {
         if cfg!(debug_assertions) {
             values.fill_bytes(0xFF); // tests then fail if they use a value that was not written: NaN or -1
         }
-        Self { values, len }
+        Self { values, len, is_in_small_pages }
     }
 
     /// Bytes of memory that it takes: it may be longer than what is used of it.
@@ -58,7 +71,7 @@ impl<T: Pooled> Clone for Buffer<T> {
 
 impl<T: Pooled> Drop for Buffer<T> {
     fn drop(&mut self) {
-        if !self.values.is_empty() {
+        if !(self.values.is_empty() || self.is_in_small_pages) {
             spare::<T>().push(std::mem::take(&mut self.values));
         }
     }

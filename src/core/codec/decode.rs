@@ -9,6 +9,7 @@ use super::buffer::Buffer;
 use super::codes::Codes;
 use super::field::{Above, Field, LONG_RUN, Plane, RUN, Stored};
 use super::rows::Change;
+use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
 use std::ops::Range;
@@ -238,7 +239,7 @@ impl Block {
     }
 
     fn stored(&self) -> Stored<'_> {
-        Stored { size: self.of, step: self.step, codes: &self.codes, above: self.above.as_ref() }
+        Stored { size: self.of, step: self.step, codes: &self.codes, above: self.above.as_ref(), part: None }
     }
 
     /// Decodes the codes to coefficients.
@@ -256,7 +257,12 @@ impl Block {
 
     /// Decodes every k that `wanted` marks of a block that a pyramid refines.
     pub fn refined(&self, codec: &WindowCodec, wanted: &[bool]) -> Field<'static> {
-        Field::refined(codec, self.of, self.step, self.codes.sparse(), self.above.as_ref(), wanted)
+        Field::refined(codec, self.stored(), wanted)
+    }
+
+    /// The same for the voxels of a part of the block; the coefficients of others are arbitrary.
+    pub fn refined_in(&self, codec: &WindowCodec, wanted: &[bool], part: &Region) -> Field<'static> {
+        Field::refined(codec, Stored { part: Some(part), ..self.stored() }, wanted)
     }
 
     /// Bytes of memory that the block takes.

@@ -16,7 +16,7 @@ use super::buffer::{Buffer, clear};
 use super::check::Tally;
 use super::codes::Codes;
 use super::error_weights::QuantizerSetup;
-use super::field::{Above, Field};
+use super::field::{Above, Field, Stored};
 use super::listed::may_be_smaller;
 use super::load::{Missing, load_group};
 use super::refine::{Coded, Source};
@@ -129,7 +129,8 @@ impl Encoder {
     ) -> (EncodedBlock, Field<'static>) {
         let Parts { stats, parts, .. } = Parts::new(&Tally::new(), 0.0, 0.0, Vec::new());
         let wanted = vec![true; codec.basis.coefficients()];
-        let field = Field::refined(codec, size, 0.0, Codes::default().sparse(), above, &wanted);
+        let of = Stored { size, step: 0.0, codes: &Codes::default(), above, part: None };
+        let field = Field::refined(codec, of, &wanted);
         (EncodedBlock { id, stats, parts }, field)
     }
 

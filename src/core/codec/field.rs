@@ -6,6 +6,7 @@ use super::codes::{Codes, PooledCodes};
 use super::pyramid::{Nodes, PARTS, PredictionPasses};
 use super::real::Real;
 use super::rows::{self, Change};
+use crate::base::grid::Region;
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane, TimeBasis};
 use std::ops::Range;
@@ -46,9 +47,10 @@ pub struct Above {
 }
 
 impl Above {
-    /// Copies the `size` nodes from `start` on out of the block above, which has `outer` nodes along x, y, z.
-    pub fn new(above: &Field<'_>, outer: [usize; 3], start: [usize; 3], size: [usize; 3]) -> Self {
-        Self { nodes: above.cut(outer, start, size), size }
+    /// Copies the nodes `whole` out of the block above, which has `outer` nodes along x, y, z. Outside of `part`, counted from their
+    /// first, nodes are arbitrary.
+    pub fn new(above: &Field<'_>, outer: [usize; 3], whole: &Region, part: &Region) -> Self {
+        Self { nodes: above.cut(outer, whole, part), size: whole.dims() }
     }
 
     /// Bytes of memory that they take.
@@ -75,6 +77,8 @@ pub(super) struct Stored<'a> {
     pub(super) step: f64,
     pub(super) codes: &'a Codes,
     pub(super) above: Option<&'a Above>,
+    /// The nodes that are decoded; others are arbitrary. All if `None`.
+    pub(super) part: Option<&'a Region>,
 }
 
 /// The coefficients of one k of a block, x fastest.
@@ -97,7 +101,7 @@ impl<'a> Plane<'a> {
         single: &'a mut Vec<f32>,
         double: &'a mut Vec<f64>,
     ) -> Self {
-        let Stored { size, step, codes, above } = of;
+        let Stored { size, step, codes, above, .. } = of;
         let Some(pyramid) = &codec.scheme.pyramid else {
             let voxels: usize = codec.decoded_size(size).iter().product();
             return Self::scaled(step, codes.dense().get(k * voxels..(k + 1) * voxels).unwrap_or_default(), double);
@@ -126,18 +130,13 @@ impl<'a> Plane<'a> {
 
 impl Field<'static> {
     /// Decodes the codes of a block that a pyramid refines, of every k that `wanted` marks.
-    pub(super) fn refined(
-        codec: &WindowCodec,
-        size: [usize; 3],
-        step: f64,
-        codes: &SparseCodes,
-        above: Option<&Above>,
-        wanted: &[bool],
-    ) -> Self {
+    pub(super) fn refined(codec: &WindowCodec, of: Stored<'_>, wanted: &[bool]) -> Self {
+        let above = of.above;
         if let Some(above) = above.filter(|_| codec.is_all_above()) {
-            return above.nodes.cut(above.size, [0; 3], above.size);
+            let whole = Region { start: [0; 3], end: above.size };
+            return above.nodes.cut(above.size, &whole, of.part.unwrap_or(&whole));
         }
-        let of = Refined { codec, size, step, codes, wanted };
+        let of = Refined { codec, of, wanted };
         let (values, marked) = match &codec.scheme.pyramid {
             Some(pyramid) if pyramid.single => of.values(pyramid, above.map(Above::singles), Values::Single),
             Some(pyramid) => of.values(pyramid, above.map(Above::doubles), Values::Double),
@@ -158,8 +157,9 @@ impl Field<'static> {
     ) -> wavesplat_format::Result<Self> {
         let codes =
             codec.scheme.pyramid.as_ref().map(|pyramid| codec.passes(pyramid, size).unpack(block)).transpose()?;
-        let all = vec![true; codec.basis.coefficients()];
-        Ok(Self::refined(codec, size, block.stats.step, &codes.unwrap_or_else(PooledCodes::new), above, &all))
+        let codes = Codes::Sparse(codes.unwrap_or_else(PooledCodes::new));
+        let of = Stored { size, step: block.stats.step, codes: &codes, above, part: None };
+        Ok(Self::refined(codec, of, &vec![true; codec.basis.coefficients()]))
     }
 
     /// The decoded nodes of a block, as its encoder has them, and whether each k may have some that are not zero.
@@ -174,17 +174,18 @@ impl Field<'static> {
 }
 
 impl Field<'_> {
-    /// Copies the `size` nodes from `start` on, of `outer` nodes along x, y, z.
-    fn cut(&self, outer: [usize; 3], start: [usize; 3], size: [usize; 3]) -> Field<'static> {
-        fn copy<R: Real>(nodes: Nodes<'_, R>, start: [usize; 3], size: [usize; 3], ks: usize) -> Buffer<R> {
-            let mut copy = Buffer::with_len(size.iter().product::<usize>() * ks);
-            nodes.copy(start, size, &mut copy);
+    /// Copies a region of `outer` nodes along x, y, z. Outside of `part`, counted from its first node, the copy is arbitrary.
+    fn cut(&self, outer: [usize; 3], region: &Region, part: &Region) -> Field<'static> {
+        fn copy<R: Real>(nodes: Nodes<'_, R>, region: &Region, part: &Region, ks: usize) -> Buffer<R> {
+            let (len, is_part) = (region.voxels() * ks, part.voxels() < region.voxels());
+            let mut copy = if is_part { Buffer::for_part(len) } else { Buffer::with_len(len) };
+            nodes.copy(region, part, &mut copy);
             copy
         }
         let (marked, ks) = (Some(&self.marked[..]), self.marked.len());
         let values = match &self.values {
-            Values::Single(values) => Values::Single(copy(Nodes { values, size: outer, marked }, start, size, ks)),
-            Values::Double(values) => Values::Double(copy(Nodes { values, size: outer, marked }, start, size, ks)),
+            Values::Single(values) => Values::Single(copy(Nodes { values, size: outer, marked }, region, part, ks)),
+            Values::Double(values) => Values::Double(copy(Nodes { values, size: outer, marked }, region, part, ks)),
             Values::Zero | Values::Codes { .. } => Values::Zero,
         };
         Field { values, marked: self.marked.clone() }
@@ -203,13 +204,12 @@ impl Field<'_> {
 impl<'a> Field<'a> {
     /// Decodes all codes of a block. Without codes, all coefficients are zero.
     pub(super) fn decode(codec: &WindowCodec, of: Stored<'a>) -> Self {
-        let Stored { size, step, codes, above } = of;
-        match codes {
+        let all = vec![true; codec.basis.coefficients()];
+        match of.codes {
             Codes::Dense(codes) if !codes.is_empty() => {
-                let marked = vec![true; codec.basis.coefficients()];
-                Self { values: Values::Codes { step, codes }, marked }
+                Self { values: Values::Codes { step: of.step, codes }, marked: all }
             }
-            _ => Field::refined(codec, size, step, codes.sparse(), above, &vec![true; codec.basis.coefficients()]),
+            _ => Field::refined(codec, of, &all),
         }
     }
 
@@ -433,9 +433,7 @@ fn widen(values: &[f32], out: &mut [f64]) {
 /// Codes of a block to decode by a pyramid.
 struct Refined<'a> {
     codec: &'a WindowCodec,
-    size: [usize; 3],
-    step: f64,
-    codes: &'a SparseCodes,
+    of: Stored<'a>,
     wanted: &'a [bool],
 }
 
@@ -447,13 +445,17 @@ impl Refined<'_> {
         known: Option<Nodes<'_, R>>,
         values: fn(Buffer<R>) -> Values<'v>,
     ) -> (Values<'v>, Vec<bool>) {
-        let &Self { codec, size, step, codes, wanted } = self;
-        let (ks, nodes) = (codec.basis.coefficients(), codec.decoded_size(size));
+        let &Self { codec, of: Stored { size, step, codes, part, .. }, wanted } = self;
+        let (ks, nodes, codes) = (codec.basis.coefficients(), codec.decoded_size(size), codes.sparse());
         if codes.count() == 0 && known.is_none() {
             return (Values::Zero, vec![false; ks]);
         }
-        let mut field = Buffer::with_len(nodes.iter().product::<usize>() * ks);
-        let marked = codec.passes(pyramid, size).decode_some(wanted, step, codes, known, &mut field);
+        let (passes, len) = (codec.passes(pyramid, size), nodes.iter().product::<usize>() * ks);
+        let (passes, mut field) = match part {
+            Some(part) => (passes.within(part), Buffer::for_part(len)),
+            None => (passes, Buffer::with_len(len)),
+        };
+        let marked = passes.decode_some(wanted, step, codes, known, &mut field);
         (if marked.contains(&true) { values(field) } else { Values::Zero }, marked)
     }
 }

@@ -28,6 +28,7 @@ pub mod scheme;
 pub mod trial;
 mod truncate;
 
+use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{ErrorBound, difference_up};
 use crate::wavelet::{self, LANES, TimeBasis};
@@ -161,6 +162,15 @@ impl WindowCodec {
     /// The nodes along x, y, z that a block of `size` voxels begins with; `above` is [`Self::above`].
     pub fn known_size(&self, above: &Self, size: [usize; 3]) -> [usize; 3] {
         if self.is_all_above() { self.decoded_size(size) } else { above.decoded_size(size) }
+    }
+
+    /// The part of the nodes that a block of `size` voxels begins with on which the nodes of `part` depend. The block begins with
+    /// `width` nodes along x.
+    pub fn needed_above(&self, size: [usize; 3], part: &Region, width: usize) -> Region {
+        match &self.scheme.pyramid {
+            Some(pyramid) if !self.is_all_above() => self.passes(pyramid, size).within(part).needed_above(width),
+            _ => *part,
+        }
     }
 
     /// The codec of a tier's blocks at a level of detail of their lattice.

@@ -1,9 +1,10 @@
 //! Packs the codes of a block anew, without decoding to samples: no value changes.
 
 use super::WindowCodec;
+use super::codes::Codes;
 use super::decode::Block;
 use super::encode::Encoder;
-use super::field::Field;
+use super::field::{Field, Stored};
 use wavesplat_format::{BlockEntry, EncodedBlock, EncodedPart, PartKind, Pyramid, Reader, Result, Storage};
 
 impl Encoder {
@@ -48,13 +49,14 @@ impl Encoder {
         codes: &[i32],
     ) -> Result<Vec<EncodedPart>> {
         let passes = codec.passes(pyramid, size);
-        let listed = passes.list(codes);
-        let all = vec![true; codec.basis.coefficients()];
-        let field = Field::refined(codec, size, step, &listed, None, &all);
-        let changes = field.changes(&passes, step, &listed, None, field.marked());
+        let listed = Codes::Sparse(passes.list(codes));
+        let of = Stored { size, step, codes: &listed, above: None, part: None };
+        let field = Field::refined(codec, of, &vec![true; codec.basis.coefficients()]);
+        let listed = listed.sparse();
+        let changes = field.changes(&passes, step, listed, None, field.marked());
         let mut parts = Vec::new();
         for (part, change) in (0..).zip(&changes) {
-            let count = passes.count(part, &listed);
+            let count = passes.count(part, listed);
             if count > 0 {
                 let mut raw = Vec::new();
                 pyramid.packing.pack(&passes.part_of(part, codes), &mut raw);

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use wavesplat_core::base::error::Result;
-use wavesplat_core::base::grid::BlockGrid;
+use wavesplat_core::base::grid::{BlockGrid, Region};
 use wavesplat_core::base::memory::FIXED;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::field::{Above, Field};
@@ -112,6 +112,13 @@ impl AboveBlocks {
         Ok(field)
     }
 
+    /// A block that stays decoded.
+    pub(super) fn kept(&self, key: &AboveKey) -> Option<Arc<Field<'static>>> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let (_, slot) = kept.iter().find(|(of, _)| of == key)?;
+        slot.try_lock().ok()?.clone() // another thread may decode it just now
+    }
+
     /// The place of a decoded block, which becomes the most recently used one: the place in the list, else `decoded`, else a new one.
     /// The least recently used blocks make room, and what else was decoded of the same block: readers that take turns with
     /// other coefficients of a file decode it again.
@@ -166,7 +173,23 @@ impl PlaceAbove {
 
     /// Copies the block's nodes out of the decoded block above.
     pub(crate) fn cut(&self, field: &Field<'_>) -> Above {
-        Above::new(field, self.outer, self.start, self.size)
+        self.cut_part(field, &Region { start: [0; 3], end: self.size })
+    }
+
+    /// The same of some of the block's nodes; the others are arbitrary.
+    pub(super) fn cut_part(&self, field: &Field<'_>, part: &Region) -> Above {
+        Above::new(field, self.outer, &self.above(&Region { start: [0; 3], end: self.size }), part)
+    }
+
+    /// Some of the block's nodes as nodes of the block above.
+    pub(super) fn above(&self, part: &Region) -> Region {
+        let moved = |of: [usize; 3]| std::array::from_fn(|axis| self.start[axis] + of[axis]);
+        Region { start: moved(part.start), end: moved(part.end) }
+    }
+
+    /// The block's nodes along x.
+    pub(super) fn width(&self) -> usize {
+        self.size[0]
     }
 }
 

@@ -103,6 +103,11 @@ impl DecodedBlocks {
         !seen.insert((id, lod))
     }
 
+    /// Whether a block was read before.
+    pub(super) fn was_read(&self, id: BlockId, lod: u32) -> bool {
+        self.kept().seen.contains(&(id, lod))
+    }
+
     /// Whether something of a block is kept. This is no use of it.
     pub(super) fn has(&self, key: &DecodedKey) -> bool {
         self.kept().entries.contains_key(key)

@@ -101,47 +101,77 @@ impl CoefficientFile {
         part: &Region,
     ) -> Result<Option<(Vec<u8>, u64)>> {
         let repeats = wanted.frames.windows(2).any(|two| two[0] == two[1]);
-        let voxels = self.decoded_voxels(codec, entry)?;
-        let cost = decoded_together(part);
-        if repeats || SMALL * cost > voxels || !is_divisible(codec, entry) || self.keeps(entry, DecodedForm::Samples) {
+        if repeats || !self.is_small(codec, entry, part, SMALL)? || self.keeps(entry, DecodedForm::Samples) {
             return Ok(None);
         }
+        let is_alone = self.reads_alone(codec, entry, part)?;
         let is_again = self.kept.as_ref().is_some_and(|kept| kept.is_read_again(entry.id, self.lod));
-        if is_again && TINY * cost > voxels {
+        if is_again && !self.is_small(codec, entry, part, TINY)? {
             return Ok(None); // several such parts take longer than all samples
         }
-        let (decoded, bytes_read) = self.coefficients_of(codec, entry, &wanted.coefficients, is_again)?;
+        let keeps = is_again || !is_alone && wanted.coefficients.iter().all(|wanted| *wanted);
+        let (decoded, bytes_read) = match self.all_coefficients(codec, entry, keeps)? {
+            Some(all) => all,
+            None => self.coefficients_of_part(codec, entry, &wanted.coefficients, part, is_alone)?,
+        };
         let DecodedBlock { block, field } = decoded.as_ref();
         let samples = field.as_ref().map(|field| block.samples_of_part(codec, field, &wanted.frames, part));
         Ok(samples.map(|samples| (samples, bytes_read)))
     }
 
-    /// A divisible block with its coefficients, at least those that are marked, and the stored bytes read. All are kept if all are
-    /// marked or the block is read again, and if there is room.
-    fn coefficients_of(
+    /// Whether [`Self::samples_of_part`] decodes only what the part depends on, in the block and in those above: it is tiny, and the
+    /// first one read of the block.
+    pub fn reads_alone(&self, codec: &WindowCodec, entry: &BlockEntry, part: &Region) -> Result<bool> {
+        let was_read = |kept: &Arc<DecodedBlocks>| kept.was_read(entry.id, self.lod);
+        let is_first = !self.keeps_samples(entry) && !self.kept.as_ref().is_some_and(was_read);
+        Ok(is_first && self.is_small(codec, entry, part, TINY)?)
+    }
+
+    /// Whether a part of a [divisible](is_divisible) block takes the time of at most one voxel in so many of it.
+    fn is_small(&self, codec: &WindowCodec, entry: &BlockEntry, part: &Region, one_in: usize) -> Result<bool> {
+        let voxels = self.decoded_voxels(codec, entry)?;
+        Ok(one_in * decoded_together(part) <= voxels && is_divisible(codec, entry))
+    }
+
+    /// A divisible block with all its coefficients, and the stored bytes read: if they are kept, or `keeps` asks for that and there is
+    /// room.
+    fn all_coefficients(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        keeps: bool,
+    ) -> Result<Option<(Arc<DecodedBlock>, u64)>> {
+        let Some(kept) = &self.kept else { return Ok(None) };
+        let key = self.key(entry, DecodedForm::All);
+        if let Some(decoded) = kept.block(&key) {
+            return Ok(Some((decoded, 0)));
+        }
+        let all = vec![true; codec.basis.coefficients()];
+        let bytes = self.decoded_voxels(codec, entry)? * all.len() * self.coefficient_size();
+        if !keeps || !kept.has_room(bytes) {
+            return Ok(None);
+        }
+        let block = self.block(codec, entry, &all)?;
+        let (field, bytes_read) = (Some(block.refined(codec, &all)), block.bytes_read);
+        let decoded = Arc::new(DecodedBlock { block, field });
+        kept.keep_block(key, &decoded);
+        Ok(Some((decoded, bytes_read)))
+    }
+
+    /// A divisible block with the coefficients that are marked of a part, and the stored bytes read. If `is_alone`, blocks above are
+    /// decoded for the part only.
+    fn coefficients_of_part(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
         wanted: &[bool],
-        is_again: bool,
+        part: &Region,
+        is_alone: bool,
     ) -> Result<(Arc<DecodedBlock>, u64)> {
-        let decode = |wanted: &[bool]| {
-            let block = self.block(codec, entry, wanted)?;
-            let (field, bytes_read) = (Some(block.refined(codec, wanted)), block.bytes_read);
-            Ok((Arc::new(DecodedBlock { block, field }), bytes_read))
-        };
-        let Some(kept) = &self.kept else { return decode(wanted) };
-        let key = self.key(entry, DecodedForm::All);
-        if let Some(decoded) = kept.block(&key) {
-            return Ok((decoded, 0));
-        }
-        let bytes = self.decoded_voxels(codec, entry)? * wanted.len() * self.coefficient_size();
-        if !(is_again || wanted.iter().all(|wanted| *wanted)) || !kept.has_room(bytes) {
-            return decode(wanted);
-        }
-        let (decoded, bytes_read) = decode(&vec![true; wanted.len()])?;
-        kept.keep_block(key, &decoded);
-        Ok((decoded, bytes_read))
+        let block =
+            if is_alone { self.block_part(codec, entry, wanted, part) } else { self.block(codec, entry, wanted) }?;
+        let (field, bytes_read) = (Some(block.refined_in(codec, wanted, part)), block.bytes_read);
+        Ok((Arc::new(DecodedBlock { block, field }), bytes_read))
     }
 
     /// The voxels of a block that are decoded at the level of detail.

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::memory::MOST_BLOCKS;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::Block;
@@ -20,6 +21,41 @@ impl CoefficientFile {
         let place = PlaceAbove::new(self.metadata(), codec, &above, id);
         let field = self.field(&above, place.id, wanted_above(codec, wanted))?;
         Ok(Some(place.cut(&field)))
+    }
+
+    /// As [`Self::above`], decoding only the nodes on which those of a part of the block depend; others are arbitrary.
+    pub(super) fn above_part(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+        part: &Region,
+    ) -> Result<Option<Above>> {
+        let Some(above) = codec.above() else { return Ok(None) };
+        let place = PlaceAbove::new(self.metadata(), codec, &above, entry.id);
+        let needed = codec.needed_above(self.all_voxels(entry)?, part, place.width());
+        let (key, part) = (above_key(&above, place.id, wanted_above(codec, wanted)), place.above(&needed));
+        let field = match self.above.kept(&key) {
+            Some(field) => field,
+            None => {
+                let block = self.block_part(&above, &self.entry_above(place.id)?, &key.wanted, &part)?;
+                Arc::new(block.refined_in(&above, &key.wanted, &part))
+            }
+        };
+        Ok(Some(place.cut_part(&field, &needed)))
+    }
+
+    /// Reads a block to decode some of its voxels: it begins with the nodes that these need.
+    pub(super) fn block_part(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        wanted: &[bool],
+        part: &Region,
+    ) -> Result<Block> {
+        let begins_above = entry.begins_above(codec.tiers());
+        let above = if begins_above { self.above_part(codec, entry, wanted, part)? } else { None };
+        Block::read(&self.reader, codec, entry, self.all_voxels(entry)?, wanted, above).map_err(|e| self.failed(e))
     }
 
     /// Decodes in parallel the blocks above that some blocks share, as many as stay decoded. Otherwise threads would wait for each
@@ -68,7 +104,7 @@ impl CoefficientFile {
 
     /// The decoded nodes of a block above others, kept or decoded now.
     pub(super) fn field(&self, codec: &WindowCodec, id: BlockId, wanted: Vec<bool>) -> Result<Arc<Field<'static>>> {
-        let key = AboveKey { id, lod: codec.lod, wanted };
+        let key = above_key(codec, id, wanted);
         self.above.field(&key, || {
             let (entry, above) = (self.entry_above(id)?, self.above(codec, id, &key.wanted)?);
             let block = Block::read(&self.reader, codec, &entry, self.all_voxels(&entry)?, &key.wanted, above);
@@ -144,6 +180,10 @@ impl CoefficientFile {
 
 /// Stored bytes of blocks that are read together: fewer than a remote file fetches at a time.
 const STORED_TOGETHER: u64 = 16 << 20;
+
+fn above_key(codec: &WindowCodec, id: BlockId, wanted: Vec<bool>) -> AboveKey {
+    AboveKey { id, lod: codec.lod, wanted }
+}
 
 /// The coefficients of a block above that those of a block need. If time is refined, all.
 pub(super) fn wanted_above(codec: &WindowCodec, wanted: &[bool]) -> Vec<bool> {

@@ -258,8 +258,7 @@ impl Group<'_> {
         let read = |entry: &BlockEntry| {
             let region = file.blocks.region(entry.id.block as usize);
             let out = || out.lock().unwrap_or_else(PoisonError::into_inner);
-            let shared = region.intersect(&target.region);
-            let part = shared.relative_to(&region);
+            let (shared, part) = target.shared(&region);
             if let Some((samples, bytes_read)) = file.samples_of_part(&codec, entry, &wanted, &part)? {
                 target.copy(&codec, &numbers, &shared, &samples, &mut out());
                 return Ok(bytes_read);
@@ -273,8 +272,7 @@ impl Group<'_> {
             for group in file.by_shared(&entries) {
                 self.progress.check()?;
                 file.fetch_blocks(&codec, group.iter().copied(), &wanted.coefficients)?;
-                let decoded_now = group.iter().copied().filter(|entry| !file.keeps_samples(entry));
-                file.decode_shared(&codec, decoded_now, &wanted.coefficients)?;
+                file.decode_shared(&codec, self.sharing(&codec, &group, target)?, &wanted.coefficients)?;
                 let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
                 for some in group.chunks(if is_any { group.len() } else { at_once }) {
                     report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
@@ -283,6 +281,23 @@ impl Group<'_> {
             report.blocks_read += entries.len() as u64;
         }
         Ok(())
+    }
+
+    /// The blocks that use whole blocks above: they are decoded now, and not for a tiny part alone.
+    fn sharing<'e>(
+        &self,
+        codec: &WindowCodec,
+        group: &[&'e BlockEntry],
+        target: &Target,
+    ) -> Result<Vec<&'e BlockEntry>> {
+        let mut sharing = Vec::new();
+        for entry in group.iter().copied().filter(|entry| !self.file.keeps_samples(entry)) {
+            let (_, part) = target.shared(&self.file.blocks.region(entry.id.block as usize));
+            if !self.file.reads_alone(codec, entry, &part)? {
+                sharing.push(entry);
+            }
+        }
+        Ok(sharing)
     }
 }
 
@@ -402,6 +417,12 @@ impl InWindow {
 }
 
 impl Target {
+    /// What a block shares with the piece, and the same counted from the block's first voxel.
+    fn shared(&self, block: &Region) -> (Region, Region) {
+        let shared = block.intersect(&self.region);
+        (shared, shared.relative_to(block))
+    }
+
     /// Copies the rows shared by a block, or a part of it, and the piece. `frames` are the numbers of the frames in `samples`.
     fn copy(&self, codec: &WindowCodec, frames: &[usize], block: &Region, samples: &[u8], out: &mut [u8]) {
         let (size, shared) = (codec.sample.size(), block.intersect(&self.region));

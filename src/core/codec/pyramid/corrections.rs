@@ -1,6 +1,7 @@
 //! Corrections of predicted nodes: codes are added to them (decoding), or computed from them (encoding).
 
 use super::known::KnownNodes;
+use super::within::Within;
 use crate::codec::real::Real;
 use crate::codec::rows;
 use wavesplat_format::SparseCodes;
@@ -10,8 +11,8 @@ pub(super) trait Correction<R> {
     /// Corrects consecutive nodes that a pass adds, from number `first` of them on.
     fn correct(&mut self, pass: usize, first: usize, predicted: &mut [R]);
 
-    /// Completes the `slice`-th of the slices that a pass adds nodes to.
-    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]);
+    /// Completes what is computed of the `slice`-th of the slices that a pass adds nodes to.
+    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R], within: &Within);
 }
 
 /// Adds the codes of a pyramid to complete slices, times the step of their level (eq 32).
@@ -27,16 +28,18 @@ impl<R: Real> Correction<R> for Decoding<'_, R> {
     #[inline(always)]
     fn correct(&mut self, _: usize, _: usize, _: &mut [R]) {}
 
-    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
+    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R], within: &Within) {
         if let Some(known) = &self.known {
-            known.restore(pass, slice, nodes, |_, _, _| {});
+            known.restore(pass, slice, nodes, within, |_, _, _| {});
         }
-        let (step, runs) = &self.passes[pass];
+        let ((step, runs), first) = (&self.passes[pass], within.places.start);
+        let computed = &mut nodes[within.places.clone()];
         for run in runs {
             let (places, values) = self.codes.run(run + slice);
             for (place, code) in places.iter().zip(values) {
-                let node = &mut nodes[*place as usize];
-                *node = *node + R::from_code(*code) * *step;
+                if let Some(node) = computed.get_mut((*place as usize).wrapping_sub(first)) {
+                    *node = *node + R::from_code(*code) * *step;
+                }
             }
         }
     }
@@ -63,10 +66,10 @@ impl<R: Real> Correction<R> for Encoding<'_, R> {
         self.fits &= rows::encode(&self.split[start + first..], predicted, &mut self.codes[pass][first..], steps);
     }
 
-    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R]) {
+    fn complete(&mut self, pass: usize, slice: usize, nodes: &mut [R], within: &Within) {
         let Some(known) = &self.known else { return };
         let (codes, count) = (&mut *self.codes[pass], nodes.len());
-        known.restore(pass, slice, nodes, |at, apart, nodes| {
+        known.restore(pass, slice, nodes, within, |at, apart, nodes| {
             let codes = codes.get_mut(slice * count + at..).unwrap_or_default(); // known passes have none
             codes.iter_mut().step_by(apart).take(nodes).for_each(|code| *code = 0);
         });

@@ -1,5 +1,7 @@
 //! The nodes with which a block below the last tier begins: those of the block above that lie in it (eq 44).
 
+use super::within::Within;
+use crate::base::grid::Region;
 use crate::codec::real::Real;
 use crate::codec::rows;
 use std::ops::Range;
@@ -36,11 +38,14 @@ impl<R: Real> Nodes<'_, R> {
         self.values.get(first..).filter(|_| self.has(k)).unwrap_or_default()
     }
 
-    /// Copies a box of `[nx, ny, nz]` nodes from `start` on, of every k that has some.
-    pub(crate) fn copy(&self, [x, y, z]: [usize; 3], [nx, ny, nz]: [usize; 3], out: &mut [R]) {
+    /// Copies a region of every k that has some; only the rows along x of `part`, counted from the region's first node.
+    pub(crate) fn copy(&self, region: &Region, part: &Region, out: &mut [R]) {
+        let (Region { start: [x, y, z], .. }, [nx, ny, nz]) = (*region, region.dims());
+        let [of_y, of_z] = [1, 2].map(|axis| part.start[axis]..part.end[axis]);
         for (k, of_k) in out.chunks_exact_mut(nx * ny * nz).enumerate().filter(|(k, _)| self.has(*k)) {
-            for (n, to) in of_k.chunks_exact_mut(nx).enumerate() {
-                put(self.row(k, [x, y + n % ny, z + n / ny]), 1, to);
+            for (row_z, row_y) in of_z.clone().flat_map(|z| of_y.clone().map(move |y| (z, y))) {
+                let to = &mut of_k[nx * (row_y + ny * row_z)..][..nx];
+                put(self.row(k, [x, y + row_y, z + row_z]), 1, to);
             }
         }
     }
@@ -73,6 +78,24 @@ impl Place {
         let place = Self { extents: [x, y, z], every: std::array::from_fn(every), frames: pass.nodes(3) };
         (pass.is_known || pass.axis == Some(Axis::T)).then_some(place)
     }
+
+    /// The known nodes along y and z that lie in what is computed of the lattice.
+    fn known(&self, within: &Within) -> [Range<usize>; 2] {
+        let known = |of: &Range<usize>, every: usize| of.start.div_ceil(every)..of.end.div_ceil(every);
+        [known(&within.y, self.every[1]), known(&within.z, self.every[2])]
+    }
+}
+
+/// A box around all known nodes in what is computed after some passes; along x all of `width` nodes.
+pub(super) fn needed<'w>(passes: &[Pass], within: impl Iterator<Item = &'w Within>, width: usize) -> Region {
+    let known = passes.iter().zip(within).filter_map(|(pass, within)| Some(Place::new(pass)?.known(within)));
+    let known: Vec<[Range<usize>; 2]> = known.collect();
+    let along = |of: usize| {
+        let ranges = known.iter().map(|known| known[of].clone()).filter(|range| !range.is_empty());
+        ranges.reduce(|all, of| all.start.min(of.start)..all.end.max(of.end)).unwrap_or(0..0)
+    };
+    let [y, z] = [along(0), along(1)];
+    Region { start: [0, y.start, z.start], end: [width, y.end, z.end] }
 }
 
 impl<'a, R: Real> KnownNodes<'a, R> {
@@ -80,22 +103,22 @@ impl<'a, R: Real> KnownNodes<'a, R> {
         Self { known, first, passes: passes.iter().map(Place::new).collect() }
     }
 
-    /// Puts the known nodes back into a slice that a pass has predicted. Calls `found` with the first place of each row of known
+    /// Puts the known nodes back into what is computed of a slice that a pass has predicted. Calls `found` with the first place of each row of known
     /// nodes, their distance and their number.
     pub(super) fn restore(
         &self,
         pass: usize,
         slice: usize,
         nodes: &mut [R],
+        within: &Within,
         mut found: impl FnMut(usize, usize, usize),
     ) {
-        let Some(Place { extents: [nx, ny, nz], every: [of_x, of_y, of_z], frames }) = self.passes[pass] else {
-            return;
-        };
-        let k = self.first + frames.0 + slice * frames.1;
-        for (z, y) in (0..nz).step_by(of_z).flat_map(|z| (0..ny).step_by(of_y).map(move |y| (z, y))) {
-            let at = nx * (y + ny * z);
-            put(self.known.row(k, [0, y / of_y, z / of_z]), of_x, &mut nodes[at..][..nx]);
+        let Some(place) = self.passes[pass] else { return };
+        let Place { extents: [nx, ny, _], every: [of_x, of_y, of_z], frames } = place;
+        let (k, [in_y, in_z]) = (self.first + frames.0 + slice * frames.1, place.known(within));
+        for (z, y) in in_z.flat_map(|z| in_y.clone().map(move |y| (z, y))) {
+            let at = nx * (of_y * y + ny * of_z * z);
+            put(self.known.row(k, [0, y, z]), of_x, &mut nodes[at..][..nx]);
             found(at, of_x, nx.div_ceil(of_x));
         }
     }

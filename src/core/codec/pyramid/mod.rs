@@ -34,6 +34,7 @@ mod known;
 mod refine;
 mod stages;
 mod stencil;
+mod within;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -43,6 +44,7 @@ use super::buffer::Buffer;
 use super::codes::PooledCodes;
 use super::real::Real;
 use super::rows::{self, Change, add_changes, add_changes_to_zero};
+use crate::base::grid::Region;
 use crate::base::vectors::dispatch;
 use crate::wavelet;
 use corrections::{Decoding, Encoding};
@@ -97,6 +99,17 @@ impl<'a> PredictionPasses<'a> {
         let place = |of: &PassBox| PlacedBox { of: Some(*of), part: of.part, at: new.placed(of), every: [1; 3] };
         new.boxes = pyramid.boxes(&new.passes).iter().map(place).collect();
         new
+    }
+
+    /// The same passes; only the nodes of a region, which is not empty, are decoded. Others are arbitrary.
+    pub(crate) fn within(mut self, region: &Region) -> Self {
+        self.stages.narrow(region);
+        self
+    }
+
+    /// A box around the known nodes that the decoded ones depend on. There are `width` known nodes along x.
+    pub(crate) fn needed_above(&self, width: usize) -> Region {
+        known::needed(&self.passes, self.stages.within(), width)
     }
 
     /// The number of nodes along x, y, z and k.

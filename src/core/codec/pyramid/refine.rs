@@ -7,6 +7,7 @@
 use super::corrections::Correction;
 use super::stencil::{predict_line, taps};
 use crate::codec::real::Real;
+use std::ops::Range;
 use wavesplat_format::Stencil;
 
 /// The rows of a lattice along the refined axis.
@@ -27,6 +28,32 @@ impl Rows {
         let (inner, outer) = (product(&extents[..axis]), product(&extents[axis + 1..]));
         Self { outer, inner, evens: extents[axis], odds, kept }
     }
+
+    /// The even rows on which some of the refined rows depend.
+    pub(super) fn needed_before(&self, stencil: Stencil, refined: Range<usize>) -> Range<usize> {
+        if self.odds == 0 {
+            return refined;
+        }
+        let needed = |row: usize| {
+            let taps = taps(stencil, row / 2, self.evens);
+            if row.is_multiple_of(2) { row / 2..row / 2 + 1 } else { taps.first..taps.first + taps.count }
+        };
+        let join = |all: Range<usize>, of: Range<usize>| all.start.min(of.start)..all.end.max(of.end);
+        refined.map(needed).reduce(join).unwrap_or(0..0)
+    }
+}
+
+/// What is computed of the rows of a lattice.
+#[derive(Debug, Clone)]
+pub(super) struct Reach {
+    /// Parts.
+    pub(super) outer: Range<usize>,
+    /// Rows of a part, after refining.
+    pub(super) rows: Range<usize>,
+    /// Nodes of a row; along the fastest axis, lines of a part.
+    pub(super) inner: Range<usize>,
+    /// The number of all of these.
+    pub(super) width: usize,
 }
 
 /// The nodes that a pass adds, from number `first` of them on.
@@ -41,25 +68,29 @@ pub(super) struct AddedNodes {
 pub(super) fn refine_across<R: Real, C: Correction<R>>(
     stencil: Stencil,
     rows: &Rows,
+    reach: &Reach,
     coarse: &[R],
     fine: &mut [R],
     added: AddedNodes,
     correction: &mut C,
 ) {
-    let &Rows { outer, inner, evens, odds, kept } = rows;
-    let apart = 1 + usize::from(odds > 0);
-    for part in 0..outer {
+    let &Rows { inner, evens, odds, kept, .. } = rows;
+    let (apart, of_row) = (1 + usize::from(odds > 0), &reach.inner);
+    let (even_rows, odd_rows) = (reach.rows.start.div_ceil(apart)..reach.rows.end.div_ceil(apart), &reach.rows);
+    for part in reach.outer.clone() {
         let from = &coarse[part * evens * inner..][..evens * inner];
         let to = &mut fine[part * (kept + odds) * inner..][..(kept + odds) * inner];
-        for i in 0..kept {
-            to[apart * i * inner..][..inner].copy_from_slice(&from[i * inner..][..inner]);
+        for i in even_rows.clone() {
+            to[apart * i * inner..][of_row.clone()].copy_from_slice(&from[i * inner..][of_row.clone()]);
         }
-        for i in 0..odds {
+        for i in odd_rows.start / 2..odds.min(odd_rows.end / 2) {
             let taps = taps(stencil, i, evens);
-            let row = |t: usize| if t < taps.count { &from[(taps.first + t) * inner..][..inner] } else { &[] };
-            let predicted = &mut to[(2 * i + 1) * inner..][..inner];
+            let row = |t: usize| {
+                if t < taps.count { &from[(taps.first + t) * inner..][of_row.clone()] } else { &[] }
+            };
+            let predicted = &mut to[(2 * i + 1) * inner..][of_row.clone()];
             taps.sum([row(0), row(1), row(2), row(3)], predicted);
-            correction.correct(added.pass, added.first + (part * odds + i) * inner, predicted);
+            correction.correct(added.pass, added.first + (part * odds + i) * inner + of_row.start, predicted);
         }
     }
 }
@@ -69,14 +100,15 @@ pub(super) fn refine_across<R: Real, C: Correction<R>>(
 pub(super) fn refine_lines<R: Real, C: Correction<R>>(
     stencil: Stencil,
     rows: &Rows,
+    reach: &Reach,
     coarse: &[R],
     fine: &mut [R],
     added: AddedNodes,
     correction: &mut C,
 ) {
-    let &Rows { outer, evens, odds, kept, .. } = rows;
+    let &Rows { evens, odds, kept, .. } = rows;
     let mut odd = vec![R::default(); odds];
-    for line in 0..outer {
+    for line in reach.outer.clone().flat_map(|part| reach.inner.clone().map(move |n| part * reach.width + n)) {
         let even = &coarse[line * evens..][..evens];
         predict_line(stencil, even, &mut odd);
         correction.correct(added.pass, added.first + line * odds, &mut odd);
@@ -94,15 +126,21 @@ pub(super) fn refine_lines<R: Real, C: Correction<R>>(
     }
 }
 
-/// Refines along time: predicts the odd slices of `slices` nodes each from the even ones, which are in place.
+/// Refines along time: predicts some places in the odd slices of `slice` nodes each from the even ones, which are in place.
 ///
 /// Only the slices that `wanted` marks are predicted. A few nodes of all slices at a time stay in the cache.
 #[inline(always)]
-pub(super) fn refine_slices<R: Real>(stencil: Stencil, slice: usize, wanted: &[bool], nodes: &mut [R]) {
+pub(super) fn refine_slices<R: Real>(
+    stencil: Stencil,
+    slice: usize,
+    places: &Range<usize>,
+    wanted: &[bool],
+    nodes: &mut [R],
+) {
     let evens = wanted.len().div_ceil(2);
     let mut predicted = [R::default(); NODES];
-    for first in (0..slice).step_by(NODES) {
-        let count = NODES.min(slice - first);
+    for first in places.clone().step_by(NODES) {
+        let count = NODES.min(places.end - first);
         for odd in (1..wanted.len()).step_by(2) {
             if wanted[odd] {
                 let taps = taps(stencil, odd / 2, evens);

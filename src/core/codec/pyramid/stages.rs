@@ -5,8 +5,10 @@
 //! `[slice][z][y][x]` of the lattice at its current refinement. Before a pass along time, slices lie at even places.
 
 use super::corrections::Correction;
-use super::refine::{AddedNodes, Rows, refine_across, refine_lines, refine_slices};
+use super::refine::{AddedNodes, Reach, Rows, refine_across, refine_lines, refine_slices};
 use super::stencil::taps;
+use super::within::Within;
+use crate::base::grid::Region;
 use crate::base::vectors::dispatch;
 use crate::codec::buffer::Buffer;
 use crate::codec::real::Real;
@@ -19,6 +21,8 @@ pub(super) struct Stages {
     stencil: Stencil,
     lattices: Vec<Lattice>,
     stages: Vec<Stage>,
+    /// Whether all nodes are computed.
+    is_whole: bool,
 }
 
 /// The lattice after a pass, and the pass.
@@ -33,6 +37,8 @@ struct Lattice {
     added: usize,
     /// The rows that a pass in space refines.
     rows: Rows,
+    /// What is computed of it.
+    within: Within,
 }
 
 /// Passes in space over all slices, and a pass along time.
@@ -65,7 +71,18 @@ impl Lattice {
             }
             _ => Rows::default(),
         };
-        Self { axis: *axis, extents, slices, added: added[..3].iter().product(), rows }
+        let within = Within::new(extents, 0..extents[1], 0..extents[2]);
+        Self { axis: *axis, extents, slices, added: added[..3].iter().product(), rows, within }
+    }
+
+    /// The rows along the refined axis that are computed.
+    fn reach(&self) -> Reach {
+        let ([x, y, _], Within { y: in_y, z: in_z, .. }) = (self.extents, self.within.clone());
+        match self.axis {
+            Some(Axis::Z) => Reach { outer: 0..1, rows: in_z, inner: in_y.start * x..in_y.end * x, width: x * y },
+            Some(Axis::Y) => Reach { outer: in_z, rows: in_y, inner: 0..x, width: x },
+            _ => Reach { outer: in_z, rows: 0..x, inner: in_y, width: y },
+        }
     }
 
     /// The number of nodes in a slice.
@@ -104,7 +121,26 @@ impl Stages {
                 (_, None) => stages.push(Stage { spatial: n..n + 1, time: None }),
             }
         }
-        Self { stencil, lattices, stages }
+        Self { stencil, lattices, stages, is_whole: true }
+    }
+
+    /// Computes only what the nodes of a region, along y and z, depend on. The region is not empty.
+    pub(super) fn narrow(&mut self, region: &Region) {
+        self.is_whole = false;
+        let [mut y, mut z] = [1, 2].map(|axis| region.start[axis]..region.end[axis]);
+        for lattice in self.lattices.iter_mut().rev() {
+            lattice.within = Within::new(lattice.extents, y.clone(), z.clone());
+            match lattice.axis {
+                Some(Axis::Y) => y = lattice.rows.needed_before(self.stencil, y),
+                Some(Axis::Z) => z = lattice.rows.needed_before(self.stencil, z),
+                _ => {}
+            }
+        }
+    }
+
+    /// What is computed of the lattice after each pass.
+    pub(super) fn within(&self) -> impl Iterator<Item = &Within> + Clone {
+        self.lattices.iter().map(|lattice| &lattice.within)
     }
 
     /// Where the nodes that a pass adds lie in the slices that it refines: the first, and their distances along x, y, z.
@@ -135,16 +171,16 @@ impl Stages {
     pub(super) fn refine<R: Real>(&self, wanted: &[bool], out: &mut [R], correction: &mut impl Correction<R>) {
         let needed = self.needed(wanted);
         let first = &self.lattices[0];
-        let mut coarse = Buffer::with_len(first.slices * first.slice());
-        coarse.fill(R::default());
+        let mut coarse = self.buffer(first.slices * first.slice());
         for (n, slice) in coarse.chunks_exact_mut(first.slice()).enumerate() {
+            slice[first.within.places.clone()].fill(R::default());
             correction.correct(0, n * first.added, slice);
-            correction.complete(0, n, slice);
+            correction.complete(0, n, slice, &first.within);
         }
         let Some((last, others)) = self.stages.split_last() else { return out.copy_from_slice(&coarse) };
         for (stage, needed) in others.iter().zip(&needed) {
             let fine = &self.lattices[stage.ends()[1]];
-            let mut nodes = Buffer::with_len(fine.slices * fine.slice());
+            let mut nodes = self.buffer(fine.slices * fine.slice());
             self.refine_stage(stage, needed, &coarse, &mut nodes, correction);
             coarse = nodes;
         }
@@ -166,11 +202,12 @@ impl Stages {
             self.refine_slice(stage, n, slice, to, correction);
         }
         let Some(time) = stage.time else { return };
-        dispatch!(refine_slices(self.stencil, after, needed, &mut *fine));
+        let within = &self.lattices[time].within;
+        dispatch!(refine_slices(self.stencil, after, &within.places, needed, &mut *fine));
         for (n, slice) in fine.chunks_exact_mut(after).skip(1).step_by(2).enumerate() {
             if needed[2 * n + 1] {
                 correction.correct(time, n * after, slice);
-                correction.complete(time, n, slice);
+                correction.complete(time, n, slice, within);
             }
         }
     }
@@ -184,10 +221,13 @@ impl Stages {
         fine: &mut [R],
         correction: &mut impl Correction<R>,
     ) {
-        let Some(last) = stage.spatial.clone().last() else { return fine.copy_from_slice(coarse) };
+        let Some(last) = stage.spatial.clone().last() else {
+            let places = self.lattices[stage.spatial.start].within.places.clone();
+            return fine[places.clone()].copy_from_slice(&coarse[places]);
+        };
         let mut nodes: Option<Buffer<R>> = None;
         for pass in stage.spatial.start..last {
-            let mut finer = Buffer::with_len(self.lattices[pass].slice());
+            let mut finer = self.buffer(self.lattices[pass].slice());
             self.refine_pass(pass, n, nodes.as_deref().unwrap_or(coarse), &mut finer, correction);
             nodes = Some(finer);
         }
@@ -202,14 +242,14 @@ impl Stages {
         fine: &mut [R],
         correction: &mut impl Correction<R>,
     ) {
-        let Lattice { rows, added, .. } = &self.lattices[pass];
-        let added = AddedNodes { pass, first: n * added };
+        let Lattice { rows, added, within, .. } = &self.lattices[pass];
+        let (added, reach) = (AddedNodes { pass, first: n * added }, self.lattices[pass].reach());
         if rows.inner == 1 {
-            dispatch!(refine_lines(self.stencil, rows, coarse, &mut *fine, added, &mut *correction));
+            dispatch!(refine_lines(self.stencil, rows, &reach, coarse, &mut *fine, added, &mut *correction));
         } else {
-            dispatch!(refine_across(self.stencil, rows, coarse, &mut *fine, added, &mut *correction));
+            dispatch!(refine_across(self.stencil, rows, &reach, coarse, &mut *fine, added, &mut *correction));
         }
-        correction.complete(pass, n, fine);
+        correction.complete(pass, n, fine, within);
     }
 
     /// For every stage but the last, the slices after it that the wanted ones need.
@@ -220,6 +260,10 @@ impl Stages {
         }
         needed.reverse();
         needed
+    }
+
+    fn buffer<R: Real>(&self, len: usize) -> Buffer<R> {
+        if self.is_whole { Buffer::with_len(len) } else { Buffer::for_part(len) }
     }
 
     /// The slices before a stage that those after it need.

@@ -154,7 +154,9 @@ impl Case {
         };
         let known = self.lattice([0; 4], [n, n, n, 1], outer).into_iter().map(|node| (node, at(node))).collect();
         let mut cut = vec![f64::NAN; own.iter().product::<usize>() * self.ks];
-        Nodes { values: &nodes, size: [nx, ny, nz], marked: Some(&marked) }.copy(start, own, &mut cut);
+        let region = Region { start, end: std::array::from_fn(|a| start[a] + own[a]) };
+        let whole = Region { start: [0; 3], end: own };
+        Nodes { values: &nodes, size: [nx, ny, nz], marked: Some(&marked) }.copy(&region, &whole, &mut cut);
         Known { cut, own, marked, nodes: if self.is_last() { HashMap::new() } else { known } }
     }
 }
@@ -171,6 +173,66 @@ impl Known {
     fn nodes(&self) -> Nodes<'_, f64> {
         Nodes { values: &self.cut, size: self.own, marked: Some(&self.marked) }
     }
+
+    /// As they are cut out, without those outside of a part.
+    fn cut_part(&self, part: &Region) -> Vec<f64> {
+        let whole = Region { start: [0; 3], end: self.own };
+        let mut cut = vec![f64::NAN; self.cut.len()];
+        self.nodes().copy(&whole, part, &mut cut);
+        cut
+    }
+}
+
+/// A region of at least one node.
+fn some_region(nodes: [usize; 3], state: &mut u64) -> Region {
+    let start = nodes.map(|n| below(n, state));
+    Region { start, end: std::array::from_fn(|a| start[a] + 1 + below(nodes[a] - start[a], state).min(2)) }
+}
+
+/// Decodes all k; those without nodes are zero.
+fn decoded(passes: &PredictionPasses<'_>, codes: &SparseCodes, known: Option<Nodes<'_, f64>>) -> Vec<f64> {
+    let [x, y, z, ks] = passes.nodes();
+    let mut field = vec![f64::NAN; x * y * z * ks];
+    put_zeros(&passes.decode_some(&vec![true; ks], 0.3, codes, known, &mut field), &mut field);
+    field
+}
+
+/// Parts need no known nodes but those that they name, and leave others out.
+#[test]
+fn parts_have_the_nodes_of_whole_blocks() {
+    let state = &mut 29;
+    let (mut compared, mut left_out, mut unneeded) = (0, 0, 0);
+    for n in 0..3000 {
+        let mut case = Case::random(state);
+        let lod = if n % 3 == 0 { 1 + below(3, state) as u32 } else { 0 };
+        case.tier = if lod > 0 { case.pyramid.tiers } else { case.tier };
+        let passes = || PredictionPasses::with_detail(&case.pyramid, case.size, case.ks, case.tier, lod);
+        let known = case.known(state);
+        let whole = case.passes();
+        let codes = whole.dense(&whole.list(&some_codes(whole.codes(), state)));
+        let coarse = (lod > 0).then(|| coarse_codes(&whole, &passes(), &codes, lod));
+        let all = whole.list(&codes);
+        let listed = coarse.as_ref().unwrap_or(&all);
+        let [x, y, z, _] = passes().nodes();
+        let region = some_region([x, y, z], state);
+        let narrow = passes().within(&region);
+        let needed =
+            if case.is_last() { Region { start: [0; 3], end: [0; 3] } } else { narrow.needed_above(known.own[0]) };
+        let cut = known.cut_part(&needed);
+        let part = (!case.is_last()).then_some(Nodes { values: &cut, ..known.nodes() });
+        let of_part = decoded(&narrow, listed, part);
+        let of_whole = decoded(&passes(), listed, (!case.is_last()).then_some(known.nodes()));
+        for (i, (found, expected)) in of_part.iter().zip(&of_whole).enumerate() {
+            let node = [i % x, i / x % y, i / (x * y) % z];
+            let is_inside = (0..3).all(|a| (region.start[a]..region.end[a]).contains(&node[a]));
+            let what = || format!("{:?} {:?} {} {lod} {region:?} {node:?}", case.pyramid, case.size, case.tier);
+            assert!(!is_inside || found.to_bits() == expected.to_bits(), "{}", what());
+            compared += usize::from(is_inside);
+            left_out += usize::from(found.to_bits() != expected.to_bits());
+        }
+        unneeded += cut.iter().zip(&known.cut).filter(|(part, whole)| part.is_nan() && !whole.is_nan()).count();
+    }
+    assert!(compared > 10_000 && left_out > 10_000 && unneeded > 10_000, "{compared} {left_out} {unneeded}");
 }
 
 #[test]

@@ -185,7 +185,7 @@ fn turning_value(from: &CoverPoint, to: &CoverPoint, rises: [f32; 2], share: f32
 #[inline(always)]
 fn near(from: &Slope, to: &Slope, values: &[f32], rays: &Rays) -> u32 {
     let (mut reached, mut is_near) = ([0.0; GROUP], [false; GROUP]);
-    for i in 0..GROUP {
+    for (i, reached) in reached.iter_mut().enumerate() {
         let [first, last] = [from, to].map(|slope| {
             slope.gradient[2][i] + rays.direction[0] * slope.gradient[0][i] + rays.direction[1] * slope.gradient[1][i]
         });
@@ -193,7 +193,7 @@ fn near(from: &Slope, to: &Slope, values: &[f32], rays: &Rays) -> u32 {
         let across = if one > other { one } else { other };
         // The height at which a ray turns back, and what the next cell may be higher.
         let height = 0.5 * rays.between * (first.abs() + last.abs()) + 0.5 * rays.width * across;
-        reached[i] = if first * last < 0.0 { height } else { -1.0 };
+        *reached = if first * last < 0.0 { height } else { -1.0 };
     }
     for value in values {
         for i in 0..GROUP {
