@@ -20,17 +20,26 @@ impl<T: Pooled> Buffer<T> {
     /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and at most twice
     /// as long, or a new one.
     pub fn with_len(len: usize) -> Self {
-        Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
+        Self::take_spare(len, 2 * len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
     }
 
     /// The same for a slice of which few entries are used: those of fresh memory that are not cost nothing.
     pub fn for_part(len: usize) -> Self {
-        Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
+        Self::take_spare(len, 2 * len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
     }
 
-    fn take_spare(len: usize) -> Option<Self> {
+    /// A copy that is kept: its memory has just its length.
+    pub fn to_keep(values: &[T]) -> Self {
+        let len = values.len();
+        let mut copy = Self::take_spare(len, len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false));
+        copy.copy_from_slice(values);
+        copy
+    }
+
+    /// A spare slice of at most `most` entries.
+    fn take_spare(len: usize, most: usize) -> Option<Self> {
         let mut spare = spare::<T>();
-        let fits = (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len()));
+        let fits = (0..spare.len()).filter(|n| (len..=most).contains(&spare[*n].len()));
         let values = fits.min_by_key(|n| spare[*n].len()).map(|n| spare.swap_remove(n));
         drop(spare);
         values.map(|values| Self::new(values, len, false))

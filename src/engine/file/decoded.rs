@@ -1,7 +1,9 @@
 //! Blocks of an open file that stay decoded for the next pictures and reads, up to a number of bytes.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec;
 use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::decode::Block;
@@ -38,6 +40,8 @@ pub(super) enum DecodedForm {
     All,
     /// All samples of the window.
     Samples,
+    /// The samples of some frames of the window, which a loop over frames reads soon.
+    Frames(Range<usize>),
 }
 
 #[derive(Debug, Clone)]
@@ -61,6 +65,16 @@ struct Kept {
     seen: HashSet<(BlockId, u32)>,
     bytes: usize,
     run: u64,
+    /// The channel and region that were read last, and the frame after those.
+    last: Option<(usize, Region, usize)>,
+    ahead: Ahead,
+}
+
+/// Frames that a loop reads soon: their number in the file, of a channel and region.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Ahead {
+    of: Option<(usize, Region)>,
+    frames: Range<usize>,
 }
 
 #[derive(Debug)]
@@ -106,6 +120,31 @@ impl DecodedBlocks {
     /// Whether a block was read before.
     pub(super) fn was_read(&self, id: BlockId, lod: u32) -> bool {
         self.kept().seen.contains(&(id, lod))
+    }
+
+    /// The frames that a read of some of them decodes and keeps together: as many as there is room for, if the read goes on with the
+    /// frame after those of the last read, and not all of the window's frames fit. Each takes `bytes`.
+    pub(super) fn ahead(
+        &self,
+        [channel, bytes]: [usize; 2],
+        region: &Region,
+        frames: &Range<usize>,
+        of_window: &Range<usize>,
+    ) -> Option<Range<usize>> {
+        let (mut kept, most) = (self.kept(), self.room / bytes.max(1));
+        let goes_on = kept.last == Some((channel, *region, frames.start));
+        kept.last = Some((channel, *region, frames.end));
+        let is_ahead = kept.ahead.of == Some((channel, *region));
+        if is_ahead && kept.ahead.frames.start <= frames.start && frames.end <= kept.ahead.frames.end {
+            return Some(kept.ahead.frames.clone());
+        }
+        if !goes_on || most >= of_window.len() || most <= frames.len() {
+            return None;
+        }
+        kept.forget_frames();
+        let ahead = frames.start..of_window.end.min(frames.start + most);
+        kept.ahead = Ahead { of: Some((channel, *region)), frames: ahead.clone() };
+        Some(ahead)
     }
 
     /// Whether something of a block is kept. This is no use of it.
@@ -161,6 +200,13 @@ impl Kept {
         self.entries.iter().filter(|(_, entry)| entry.used + 1 < self.run)
     }
 
+    /// Drops what was read ahead.
+    fn forget_frames(&mut self) {
+        let is_ahead = |key: &DecodedKey| matches!(key.form, DecodedForm::Frames(_));
+        let dropped = self.entries.extract_if(|key, _| is_ahead(key));
+        self.bytes -= dropped.map(|(_, entry)| entry.bytes).sum::<usize>();
+    }
+
     fn get(&mut self, key: &DecodedKey) -> Option<Decoded> {
         let entry = self.entries.get_mut(key)?;
         entry.used = self.run;
@@ -195,6 +241,24 @@ mod tests {
 
     fn kept(blocks: &DecodedBlocks, all: std::ops::Range<u32>) -> Vec<u32> {
         all.filter(|block| blocks.kept().entries.contains_key(&key(*block))).collect()
+    }
+
+    #[test]
+    fn reads_go_on_with_frames_that_fit() {
+        let blocks = DecodedBlocks::new(100);
+        let box_of = |end| Region { start: [0; 3], end: [end; 3] };
+        let ahead = |bytes, end, frames| blocks.ahead([0, bytes], &box_of(end), &frames, &(8..20));
+        assert_eq!(ahead(30, 2, 8..9), None, "a first read");
+        assert_eq!(ahead(30, 2, 9..10), Some(9..12));
+        assert_eq!(ahead(30, 2, 10..11), Some(9..12));
+        assert_eq!(ahead(30, 2, 15..16), None, "elsewhere");
+        assert_eq!(ahead(30, 2, 11..12), Some(9..12), "still kept");
+        assert_eq!(ahead(30, 3, 12..13), None, "another region");
+        assert_eq!(ahead(30, 3, 13..15), Some(13..16));
+        assert_eq!(ahead(30, 3, 15..19), None, "more than fits");
+        assert_eq!(ahead(30, 3, 19..20), Some(19..20), "the last of the window");
+        assert_eq!(ahead(8, 3, 8..9), None);
+        assert_eq!(ahead(8, 3, 9..10), None, "the whole window fits");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::coefficient_file::CoefficientFile;
 use super::decoded::{DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey};
+use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
@@ -16,6 +17,16 @@ const SMALL: usize = 4;
 
 /// A tiny part takes the time of at most one in so many: it is decoded from coefficients even if its block is read often.
 const TINY: usize = 64;
+
+/// Samples of a block.
+pub struct BlockSamples {
+    /// `frame * voxels + voxel`.
+    pub samples: Arc<Buffer<u8>>,
+    /// The number of the first frame in its window.
+    pub first: usize,
+    /// The stored bytes read.
+    pub bytes_read: u64,
+}
 
 impl CoefficientFile {
     /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
@@ -60,24 +71,41 @@ impl CoefficientFile {
         Ok(block)
     }
 
-    /// The samples of a block, `frame * voxels + voxel`, and the stored bytes read. Only `wanted` frames have their samples. Uses the
-    /// cache, and adds blocks that are read again. If the caller needs all frames of a part of the block (`is_part`), the cache takes it
+    /// The frames of a window, as numbers in it, that a read of some of them should decode together: more than are read, if the reads
+    /// go on from frame to frame, and the window does not fit in the cache.
+    pub fn read_ahead(&self, window: u32, channel: usize, region: &Region, frames: &[usize]) -> Option<Range<usize>> {
+        let (kept, of_window) = (self.kept.as_ref()?, self.window_range(window));
+        let voxels: usize = self.blocks.touching(region).map(|block| self.blocks.region(block).voxels()).sum();
+        let (first, last) = (*frames.first()?, *frames.last()?);
+        let is_run = frames.len() == last + 1 - first;
+        let bytes = voxels * self.sample().size();
+        let ahead = kept.ahead([channel, bytes], region, &(first..last + 1), &of_window).filter(|_| is_run)?;
+        Some(ahead.start - of_window.start..ahead.end - of_window.start)
+    }
+
+    /// The samples of a block. Only `wanted` frames have their samples. Uses the cache, and adds blocks that are read again, and the
+    /// frames that are [ahead](Self::read_ahead). If the caller needs all frames of a part of the block (`is_part`), the cache takes it
     /// at the first read.
     pub fn samples(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
         wanted: &WantedFrames,
+        ahead: Option<&WantedFrames>,
         is_part: bool,
-    ) -> Result<(Arc<Buffer<u8>>, u64)> {
+    ) -> Result<BlockSamples> {
         let decode = |wanted: &WantedFrames| {
             let block = self.block(codec, entry, &wanted.coefficients)?;
-            Ok((Arc::new(block.samples_of(codec, wanted)), block.bytes_read))
+            let samples = Arc::new(block.samples_of(codec, wanted));
+            Ok(BlockSamples { samples, first: 0, bytes_read: block.bytes_read })
         };
         let Some(kept) = &self.kept else { return decode(wanted) };
         let key = self.key(entry, DecodedForm::Samples);
         if let Some(samples) = kept.samples(&key) {
-            return Ok((samples, 0));
+            return Ok(BlockSamples { samples, first: 0, bytes_read: 0 });
+        }
+        if let Some(ahead) = ahead {
+            return self.samples_ahead(codec, entry, ahead, decode);
         }
         let is_whole = wanted.frames.len() == codec.frames();
         let is_again = kept.is_read_again(entry.id, self.lod);
@@ -85,9 +113,29 @@ impl CoefficientFile {
         if !(is_again || is_part && is_whole) || !kept.has_room(bytes) {
             return decode(wanted);
         }
-        let (samples, bytes_read) = decode(&WantedFrames::all(codec))?;
-        kept.keep_samples(key, &samples);
-        Ok((samples, bytes_read))
+        let decoded = decode(&WantedFrames::all(codec))?;
+        kept.keep_samples(key, &decoded.samples);
+        Ok(decoded)
+    }
+
+    /// The samples of some frames of a block, kept or decoded now.
+    fn samples_ahead(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        ahead: &WantedFrames,
+        decode: impl FnOnce(&WantedFrames) -> Result<BlockSamples>,
+    ) -> Result<BlockSamples> {
+        let (first, count) = (ahead.frames[0], ahead.frames.len());
+        let (kept, key) = (self.kept.as_ref(), self.key(entry, form_of(ahead)));
+        if let Some(samples) = kept.and_then(|kept| kept.samples(&key)) {
+            return Ok(BlockSamples { samples, first, bytes_read: 0 });
+        }
+        let BlockSamples { samples, bytes_read, .. } = decode(ahead)?;
+        let size = self.decoded_voxels(codec, entry)? * codec.sample.size();
+        let samples = Arc::new(Buffer::to_keep(&samples[first * size..(first + count) * size]));
+        kept.iter().for_each(|kept| kept.keep_samples(key.clone(), &samples));
+        Ok(BlockSamples { samples, first, bytes_read })
     }
 
     /// The samples of some frames in a part of a block, frame after frame, x fastest, and the stored bytes read. None if the part is
@@ -123,7 +171,7 @@ impl CoefficientFile {
     /// first one read of the block.
     pub fn reads_alone(&self, codec: &WindowCodec, entry: &BlockEntry, part: &Region) -> Result<bool> {
         let was_read = |kept: &Arc<DecodedBlocks>| kept.was_read(entry.id, self.lod);
-        let is_first = !self.keeps_samples(entry) && !self.kept.as_ref().is_some_and(was_read);
+        let is_first = !self.keeps_samples(entry, None) && !self.kept.as_ref().is_some_and(was_read);
         Ok(is_first && self.is_small(codec, entry, part, TINY)?)
     }
 
@@ -179,9 +227,10 @@ impl CoefficientFile {
         Ok(codec.decoded_size(self.all_voxels(entry)?).iter().product())
     }
 
-    /// Whether samples of a block can be read without decoding it.
-    pub fn keeps_samples(&self, entry: &BlockEntry) -> bool {
-        self.keeps(entry, DecodedForm::Samples) || self.keeps(entry, DecodedForm::All)
+    /// Whether samples of a block, or of the frames `ahead`, can be read without decoding it.
+    pub fn keeps_samples(&self, entry: &BlockEntry, ahead: Option<&WantedFrames>) -> bool {
+        let forms = [DecodedForm::Samples, DecodedForm::All].into_iter();
+        forms.chain(ahead.map(form_of)).any(|form| self.keeps(entry, form))
     }
 
     fn keeps(&self, entry: &BlockEntry, form: DecodedForm) -> bool {
@@ -202,4 +251,9 @@ impl CoefficientFile {
     fn key(&self, entry: &BlockEntry, form: DecodedForm) -> DecodedKey {
         DecodedKey { id: entry.id, lod: self.lod, form }
     }
+}
+
+/// What is kept of frames that a loop reads soon.
+fn form_of(ahead: &WantedFrames) -> DecodedForm {
+    DecodedForm::Frames(ahead.frames[0]..ahead.frames[0] + ahead.frames.len())
 }

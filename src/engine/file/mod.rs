@@ -27,4 +27,5 @@ pub mod merge;
 pub use coefficient_file::{CoefficientFile, time_labels};
 pub(crate) use decoded::DecodedBlock;
 pub use fetch::Prefetch;
+pub use keep::BlockSamples;
 pub use promise::setting;

@@ -27,7 +27,7 @@ use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::zeroed::Zeroed;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::WantedFrames;
-use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::{BlockSamples, CoefficientFile};
 use wavesplat_format::BlockEntry;
 
 /// What to extract. [`ExtractConfig::new`] asks for everything; narrow it by struct update.
@@ -252,27 +252,34 @@ impl Group<'_> {
     /// Reads the samples of a piece in frames of one window.
     fn read_window(&self, frames: &[usize], target: &Target, out: &mut [u8], report: &mut ExtractReport) -> Result<()> {
         let (file, at_once) = (self.file, self.blocks);
-        let InWindow { window, codec, wanted } = InWindow::new(file, frames)?;
+        let of = InWindow::new(file, frames)?;
+        let InWindow { window, codec, wanted } = &of;
         let (is_part, numbers) = (target.region != file.grid.whole(), (0..frames.len()).collect::<Vec<usize>>());
+        let ahead = file.read_ahead(*window, self.config.channel, &target.region, frames);
+        let ahead = ahead.map(|frames| WantedFrames::new(codec, frames.collect()));
+        let decoded = ahead.as_ref().unwrap_or(wanted);
         let out = Mutex::new(out);
         let read = |entry: &BlockEntry| {
             let region = file.blocks.region(entry.id.block as usize);
             let out = || out.lock().unwrap_or_else(PoisonError::into_inner);
             let (shared, part) = target.shared(&region);
-            if let Some((samples, bytes_read)) = file.samples_of_part(&codec, entry, &wanted, &part)? {
-                target.copy(&codec, &numbers, &shared, &samples, &mut out());
+            if let Some((samples, bytes_read)) = file.samples_of_part(codec, entry, wanted, &part)? {
+                target.copy(codec, &numbers, &shared, &samples, &mut out());
                 return Ok(bytes_read);
             }
-            let (samples, bytes_read) = file.samples(&codec, entry, &wanted, is_part)?;
-            target.copy(&codec, &wanted.frames, &region, &samples, &mut out());
+            let BlockSamples { samples, first, bytes_read } =
+                file.samples(codec, entry, wanted, ahead.as_ref(), is_part)?;
+            let frames: Vec<usize> = wanted.frames.iter().map(|frame| frame - first).collect();
+            target.copy(codec, &frames, &region, &samples, &mut out());
             Ok(bytes_read)
         };
-        for entries in file.entries(window, self.config.channel, &target.region) {
+        for entries in file.entries(*window, self.config.channel, &target.region) {
             let entries = entries?;
             for group in file.by_shared(&entries) {
                 self.progress.check()?;
-                file.fetch_blocks(&codec, group.iter().copied(), &wanted.coefficients)?;
-                file.decode_shared(&codec, self.sharing(&codec, &group, target)?, &wanted.coefficients)?;
+                file.fetch_blocks(codec, group.iter().copied(), &decoded.coefficients)?;
+                let sharing = self.sharing(codec, &group, target, ahead.as_ref())?;
+                file.decode_shared(codec, sharing, &decoded.coefficients)?;
                 let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
                 for some in group.chunks(if is_any { group.len() } else { at_once }) {
                     report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
@@ -289,9 +296,10 @@ impl Group<'_> {
         codec: &WindowCodec,
         group: &[&'e BlockEntry],
         target: &Target,
+        ahead: Option<&WantedFrames>,
     ) -> Result<Vec<&'e BlockEntry>> {
         let mut sharing = Vec::new();
-        for entry in group.iter().copied().filter(|entry| !self.file.keeps_samples(entry)) {
+        for entry in group.iter().copied().filter(|entry| !self.file.keeps_samples(entry, ahead)) {
             let (_, part) = target.shared(&self.file.blocks.region(entry.id.block as usize));
             if !self.file.reads_alone(codec, entry, &part)? {
                 sharing.push(entry);
