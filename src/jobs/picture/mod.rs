@@ -25,6 +25,7 @@
 mod reporter;
 pub mod values;
 mod request;
+mod distributions;
 mod session;
 mod plan;
 mod report;

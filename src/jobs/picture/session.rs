@@ -1,5 +1,6 @@
 //! The inputs of pictures, kept open for many pictures.
 
+use super::distributions::{Distributions, Kept};
 use super::reporter::Reporter;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -44,19 +45,25 @@ struct Shared {
     open: Mutex<Option<CoefficientFile>>,
     /// The same, with damaged blocks taken for missing samples.
     repaired: Mutex<Option<CoefficientFile>>,
+    distribution: Kept,
+}
+
+impl Shared {
+    fn new(inputs: Inputs, open: Option<CoefficientFile>, room: usize) -> Self {
+        let (open, repaired) = (Mutex::new(open), Mutex::default());
+        Self { inputs, room, open, repaired, distribution: Kept::default() }
+    }
 }
 
 impl Session {
     /// A session that opens these inputs when it needs them. Pictures take up to `memory` bytes.
     pub fn new(inputs: Inputs, memory: usize) -> Self {
-        let shared = Shared { inputs, room: 0, open: Mutex::default(), repaired: Mutex::default() };
-        Self { shared: shared.into(), memory }
+        Self { shared: Shared::new(inputs, None, 0).into(), memory }
     }
 
     /// A session of a file that is open, opened from `inputs`.
     pub fn from_file(file: CoefficientFile, inputs: Inputs, memory: usize) -> Self {
-        let shared = Shared { inputs, room: 0, open: Mutex::new(Some(file)), repaired: Mutex::default() };
-        Self { shared: shared.into(), memory }
+        Self { shared: Shared::new(inputs, Some(file), 0).into(), memory }
     }
 
     /// The same inputs, for many pictures: up to a quarter of the memory holds blocks that stay decoded from one to the next,
@@ -67,9 +74,8 @@ impl Session {
             return self.clone();
         }
         let room = self.memory / KEPT_SHARE;
-        let open = Mutex::new(open.map(|file| file.keeping_decoded(room)));
-        let shared = Shared { inputs: self.shared.inputs.clone(), room, open, repaired: Mutex::default() };
-        Self { shared: shared.into(), memory: self.memory - room }
+        let open = open.map(|file| file.keeping_decoded(room));
+        Self { shared: Shared::new(self.shared.inputs.clone(), open, room).into(), memory: self.memory - room }
     }
 
     /// The same inputs for pictures that take up to `memory` bytes.
@@ -106,6 +112,11 @@ impl Session {
             return Ok(file);
         }
         kept(&self.shared.repaired, || file.clone().skip_damaged())
+    }
+
+    /// The distributions of samples of the file, at its level of detail.
+    pub(super) fn distributions(&self, file: &CoefficientFile, skips_damaged: bool) -> Distributions {
+        Distributions::of_file(&self.shared.distribution, (file.id(), file.lod(), skips_damaged))
     }
 
     fn open_file(&self) -> Result<CoefficientFile> {

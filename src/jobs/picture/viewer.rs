@@ -182,16 +182,16 @@ impl ViewerSession {
     pub fn histogram(&self, frame: Option<usize>, work: &CancelToken) -> Result<Histogram> {
         let frames = frame.map_or(self.base.frames.clone(), |frame| Some((frame..frame + 1).into()));
         let (request, caller) = (PictureRequest { frames, ..self.base.clone() }, Caller(work));
-        let Opened { mut scene, file, colours, .. } = Opened::new(&self.session, &request, &caller)?;
+        let Opened { mut scene, file, distributions, colours, .. } = Opened::new(&self.session, &request, &caller)?;
         let all = scene.frames().unwrap_or(0);
         let memory = self.session.memory;
         let config = render_config(&request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, memory)?;
         let samples = match frame {
-            Some(frame) => distribution_of_frames(scene.as_mut(), &config, &[frame], &caller)?,
-            None => distribution(scene.as_mut(), &config, None, &caller)?,
+            Some(frame) => distribution_of_frames(scene.as_mut(), &distributions, &config, vec![frame], &caller)?,
+            None => distribution(scene.as_mut(), &distributions, &config, None, &caller)?,
         };
         Ok(samples
-            .as_ref()
+            .as_deref()
             .map_or_else(|| Histogram { range: None, counts: Vec::new(), surface: None }, Histogram::new))
     }
 

@@ -2,15 +2,17 @@
 
 use super::modes;
 use super::planes::{planes_of, with_planes};
-use super::ranges::{self, Needed, Overview, Ranges};
+use super::ranges::{self, Needed, Ranges};
 use super::targets::Targets;
 use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
+use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
 use crate::picture::values::{ModeName, Theme};
 use serde::Serialize;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::colour::{Norm, Rgb, Scale, TransferFunction};
+use wavesplat_core::base::grid::Grid;
+use wavesplat_core::colour::{Distribution, Norm, Rgb, Scale, TransferFunction};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::render::sink::PictureFormat;
 use wavesplat_engine::render::{Mode, Pixel, Quantity, RenderConfig, Scene};
@@ -145,6 +147,7 @@ fn report_ranges((lo, hi): (f64, f64), ranges: &Ranges, found: Needed, reporter:
 pub(in crate::picture) fn automatic_colours(
     request: &PictureRequest,
     scene: &mut dyn Scene,
+    distributions: &Distributions,
     config: &mut RenderConfig,
     colours: Option<TransferFunction>,
     reporter: &dyn Reporter,
@@ -163,7 +166,8 @@ pub(in crate::picture) fn automatic_colours(
         reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
     }
     if modes::suggests_opacities(request, &colours) {
-        colours = suggested_opacities(request, scene, config, &colours, overview.as_ref(), reporter)?;
+        let samples = ranges::distribution(scene, distributions, config, overview.as_ref(), reporter)?;
+        colours = suggested_opacities(request, scene.grid(), &colours, samples.as_deref())?;
     }
     let planes = planes_of(&config.mode);
     config.mode = with_planes(modes::mode(request, Some(&colours))?, planes);
@@ -184,19 +188,14 @@ pub(in crate::picture) fn note_surfaces(
     }
 }
 
-/// The same colours, with opacities by how rare values are.
+/// The same colours, with opacities by how rare values are among some samples.
 fn suggested_opacities(
     request: &PictureRequest,
-    scene: &mut dyn Scene,
-    config: &RenderConfig,
+    grid: &Grid,
     colours: &TransferFunction,
-    overview: Option<&Overview>,
-    reporter: &dyn Reporter,
+    samples: Option<&Distribution>,
 ) -> Result<TransferFunction> {
-    let Some(samples) = ranges::distribution(scene, config, overview, reporter)? else {
-        return Ok(colours.clone());
-    };
-    let grid = scene.grid();
+    let Some(samples) = samples else { return Ok(colours.clone()) };
     let volume: f64 = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).product();
     let path = volume.cbrt() / modes::opacity_unit(request, grid);
     let points = samples.opacities(colours.range(), path);

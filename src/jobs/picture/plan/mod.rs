@@ -55,7 +55,7 @@ impl Plan {
     /// Opens the scene of a request, and chooses the settings and colours of its pictures.
     pub(super) fn new(session: &Session, request: &PictureRequest, reporter: &dyn Reporter) -> Result<Self> {
         check_slices(request)?;
-        let Opened { mut scene, file, exaggeration, annotation, colours, axes } =
+        let Opened { mut scene, file, distributions, exaggeration, annotation, colours, axes } =
             Opened::new(session, request, reporter)?;
         let all = scene.frames().unwrap_or(0);
         let mut config =
@@ -64,7 +64,7 @@ impl Plan {
         set_planes(&mut config, request, &axes, scene.grid(), &whole, lod)?;
         let targets = AllTargets::new(request, session.paths(), &config)?;
         config.memory = targets.memory_besides(scene.as_ref(), request.depth, &config)?;
-        let colours = automatic_colours(request, scene.as_mut(), &mut config, colours, reporter)?;
+        let colours = automatic_colours(request, scene.as_mut(), &distributions, &mut config, colours, reporter)?;
         note_surfaces(&config, file.as_deref(), reporter);
         let input = ColouringInput {
             request,

@@ -7,6 +7,7 @@ use super::modes;
 use super::named_colours::colours_of_source;
 use super::units::values_of;
 use super::views::views;
+use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
 use crate::picture::session::{FRAMES_HINT, Session};
@@ -28,6 +29,7 @@ pub(in crate::picture) struct Opened {
     pub(in crate::picture) scene: Box<dyn Scene>,
     /// The coefficient file of the scene.
     pub(in crate::picture) file: Option<Arc<CoefficientFile>>,
+    pub(in crate::picture) distributions: Distributions,
     /// The factor by which heights are drawn taller.
     pub(in crate::picture) exaggeration: f64,
     /// The times of frames.
@@ -78,7 +80,8 @@ impl Opened {
         let colours = modes::colours_of_file(request, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), request.method));
         let axes = Axes::from_file(&file)?;
-        Ok(Self { scene, file: Some(file), exaggeration, annotation, colours, axes })
+        let distributions = session.distributions(&file, request.skip_damaged);
+        Ok(Self { scene, file: Some(file), distributions, exaggeration, annotation, colours, axes })
     }
 
     /// Frames of an archive.
@@ -103,7 +106,8 @@ impl Opened {
         };
         let exaggeration = exaggeration(request, &grid, reporter);
         let scene = Box::new(scene.with_grid(grid.exaggerated(exaggeration)));
-        Ok(Self { scene, file: None, exaggeration, annotation, colours, axes })
+        let distributions = Distributions::default();
+        Ok(Self { scene, file: None, distributions, exaggeration, annotation, colours, axes })
     }
 }
 

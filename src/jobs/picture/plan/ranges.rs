@@ -1,7 +1,9 @@
 //! The default range of colours, taken from small pictures of an overview.
 
 use super::modes::unit;
+use crate::picture::distributions::{Distributions, Sampled};
 use crate::picture::reporter::Reporter;
+use std::sync::Arc;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::base::progress::{Progress, Silent};
@@ -65,29 +67,45 @@ impl Overview {
 /// is `held` that has these samples, they are taken from it.
 pub(in crate::picture) fn distribution(
     scene: &mut dyn Scene,
+    distributions: &Distributions,
     config: &RenderConfig,
     held: Option<&Overview>,
     reporter: &dyn Reporter,
-) -> Result<Option<Distribution>> {
-    let small = small(config);
-    let (frames, thinning) = (spread(scene, LEAST_FRAMES), thinning_of_distribution(scene, &small)?);
-    match held.and_then(|held| held.of_frames(thinning.stride, &frames)) {
+) -> Result<Option<Arc<Distribution>>> {
+    let sampled = sampled(scene, config, spread(scene, LEAST_FRAMES))?;
+    distributions.get(sampled, |of| match held.and_then(|held| held.of_frames(of.thinning.stride, &of.frames)) {
         Some(samples) => Ok(Some(Distribution::new(samples))),
-        None => distribution_of_frames(scene, config, &frames, reporter),
-    }
+        None => found(scene, config, of, reporter),
+    })
 }
 
 /// The same for these frames.
 pub(in crate::picture) fn distribution_of_frames(
     scene: &mut dyn Scene,
+    distributions: &Distributions,
     config: &RenderConfig,
-    frames: &[usize],
+    frames: Vec<usize>,
+    reporter: &dyn Reporter,
+) -> Result<Option<Arc<Distribution>>> {
+    distributions.get(sampled(scene, config, frames)?, |of| found(scene, config, of, reporter))
+}
+
+/// The samples to take of some frames.
+fn sampled(scene: &dyn Scene, config: &RenderConfig, frames: Vec<usize>) -> Result<Sampled> {
+    let small = small(config);
+    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
+    Ok(Sampled { thinning: thinning_of_distribution(scene, &small)?, frames, region })
+}
+
+/// The distribution of samples in an overview, if the scene has one.
+fn found(
+    scene: &mut dyn Scene,
+    config: &RenderConfig,
+    of: &Sampled,
     reporter: &dyn Reporter,
 ) -> Result<Option<Distribution>> {
-    let small = small(config);
-    let thinning = thinning_of_distribution(scene, &small)?;
-    let region = small.region.unwrap_or(Region { start: [0; 3], end: scene.grid().dims });
-    let request = OverviewRequest { thinning, frames, memory: small.memory, region };
+    let request =
+        OverviewRequest { thinning: of.thinning, frames: &of.frames, memory: config.memory, region: of.region };
     let samples = scene.overview(&request, reporter.progress("overview", "steps").as_ref())?;
     Ok(samples.map(Distribution::new))
 }
