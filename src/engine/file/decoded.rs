@@ -4,11 +4,11 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use wavesplat_core::base::grid::Region;
-use wavesplat_core::codec;
 use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::field::Field;
-use wavesplat_format::{BlockId, PartKind};
+use wavesplat_core::codec::{self, WindowCodec};
+use wavesplat_format::{BlockEntry, BlockId, PartKind};
 
 /// A block, and its coefficients if they have to be decoded together.
 #[derive(Debug)]
@@ -23,6 +23,25 @@ impl DecodedBlock {
     }
 }
 
+/// The values of a block in the frames of a picture.
+#[derive(Debug)]
+pub(crate) struct BlockValues {
+    pub(crate) voxels: usize,
+    /// Dense values of the frames: `frame * voxels + voxel`; empty if all are zero.
+    pub(crate) dense: Vec<f64>,
+    /// For each plane, values of single voxels, ascending by voxel; empty if there are none.
+    pub(crate) few: Vec<Vec<(u32, f64)>>,
+    /// Nonzero coefficients, and the stored bytes read.
+    pub(crate) held: [u64; 2],
+}
+
+impl BlockValues {
+    fn bytes(&self) -> usize {
+        let few: usize = self.few.iter().map(|few| size_of_val(&few[..])).sum();
+        size_of_val(&self.dense[..]) + few
+    }
+}
+
 /// What is decoded of a block at a level of detail.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct DecodedKey {
@@ -34,8 +53,10 @@ pub(super) struct DecodedKey {
 /// The form in which a block is decoded.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum DecodedForm {
-    /// The coefficients that are marked, of some parts and, if so, of the nodes above.
-    Coefficients { wanted: Vec<bool>, parts: Vec<PartKind>, begins_above: bool },
+    /// The coefficients that are marked.
+    Coefficients { wanted: Vec<bool>, of: PartsRead },
+    /// Values in some frames.
+    Values { frames: Vec<usize>, of: PartsRead },
     /// All coefficients of the window.
     All,
     /// All samples of the window.
@@ -44,9 +65,25 @@ pub(super) enum DecodedForm {
     Frames(Range<usize>),
 }
 
+/// The parts of a block that are decoded, and whether it begins with the nodes of the block above.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct PartsRead {
+    parts: Vec<PartKind>,
+    begins_above: bool,
+}
+
+impl PartsRead {
+    /// Those of a directory entry.
+    pub(super) fn new(codec: &WindowCodec, entry: &BlockEntry) -> Self {
+        let parts = entry.parts.iter().map(|part| part.kind).collect();
+        Self { parts, begins_above: entry.begins_above(codec.tiers()) }
+    }
+}
+
 #[derive(Debug, Clone)]
 enum Decoded {
     Block(Arc<DecodedBlock>),
+    Values(Arc<BlockValues>),
     Samples(Arc<Buffer<u8>>),
 }
 
@@ -156,15 +193,28 @@ impl DecodedBlocks {
     pub(super) fn block(&self, key: &DecodedKey) -> Option<Arc<DecodedBlock>> {
         match self.kept().get(key)? {
             Decoded::Block(block) => Some(block),
-            Decoded::Samples(_) => None,
+            _ => None,
         }
+    }
+
+    /// The values of a block, if they are kept.
+    pub(super) fn values(&self, key: &DecodedKey) -> Option<Arc<BlockValues>> {
+        match self.kept().get(key)? {
+            Decoded::Values(values) => Some(values),
+            _ => None,
+        }
+    }
+
+    /// Whether all of this takes more than the cache has room for.
+    pub(super) fn is_too_small(&self, bytes: usize) -> bool {
+        bytes > self.room
     }
 
     /// The samples of a block, if they are kept.
     pub(super) fn samples(&self, key: &DecodedKey) -> Option<Arc<Buffer<u8>>> {
         match self.kept().get(key)? {
             Decoded::Samples(samples) => Some(samples),
-            Decoded::Block(_) => None,
+            _ => None,
         }
     }
 
@@ -178,6 +228,11 @@ impl DecodedBlocks {
     /// Keeps a block if there is room.
     pub(super) fn keep_block(&self, key: DecodedKey, block: &Arc<DecodedBlock>) {
         self.kept().put(key, Decoded::Block(block.clone()), block.bytes(), self.room);
+    }
+
+    /// Keeps values if there is room.
+    pub(super) fn keep_values(&self, key: DecodedKey, values: &Arc<BlockValues>) {
+        self.kept().put(key, Decoded::Values(values.clone()), values.bytes(), self.room);
     }
 
     /// Keeps samples if there is room.

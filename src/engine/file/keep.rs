@@ -1,7 +1,7 @@
 //! Decoding blocks of a file that keeps some decoded.
 
 use super::coefficient_file::CoefficientFile;
-use super::decoded::{DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey};
+use super::decoded::{BlockValues, DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey, PartsRead};
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
@@ -47,13 +47,14 @@ impl CoefficientFile {
         }
     }
 
-    /// As [`Self::block`], with the coefficients if they have to be decoded together. Uses and keeps what was decoded.
+    /// As [`Self::block`], with the coefficients if they have to be decoded together. Uses what was decoded, and keeps it if `keeps`.
     pub(crate) fn decoded(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
         wanted: &[bool],
         is_field_needed: bool,
+        keeps: bool,
     ) -> Result<Arc<DecodedBlock>> {
         let decode = || {
             let block = self.block(codec, entry, wanted)?;
@@ -67,8 +68,37 @@ impl CoefficientFile {
             return Ok(block);
         }
         let block = decode()?;
-        kept.keep_block(key, &block);
+        if keeps {
+            kept.keep_block(key, &block);
+        }
         Ok(block)
+    }
+
+    /// Whether pictures should keep the values of so many blocks in so many frames, and not their coefficients: these do not fit, but
+    /// values do.
+    pub(crate) fn keeps_values(&self, blocks: usize, frames: usize) -> bool {
+        let voxels = blocks * self.blocks.region(0).voxels();
+        let [values, coefficients] =
+            [frames * size_of::<f64>(), self.most_coefficients() * self.coefficient_size()].map(|each| each * voxels);
+        self.kept.as_ref().is_some_and(|kept| kept.is_too_small(coefficients) && !kept.is_too_small(values))
+    }
+
+    /// The values of a block in some frames, kept or as `make` gives them.
+    pub(crate) fn values(
+        &self,
+        codec: &WindowCodec,
+        entry: &BlockEntry,
+        frames: &[usize],
+        make: impl FnOnce() -> Result<BlockValues>,
+    ) -> Result<Arc<BlockValues>> {
+        let Some(kept) = &self.kept else { return make().map(Arc::new) };
+        let key = self.key_of_values(codec, entry, frames);
+        if let Some(values) = kept.values(&key) {
+            return Ok(values);
+        }
+        let values = Arc::new(make()?);
+        kept.keep_values(key, &values);
+        Ok(values)
     }
 
     /// The frames of a window, as numbers in it, that a read of some of them should decode together: more than are read, if the reads
@@ -242,10 +272,19 @@ impl CoefficientFile {
         self.kept.as_ref().is_some_and(|kept| kept.has(&self.key_of_coefficients(codec, entry, wanted)))
     }
 
+    /// Whether the values of a block are kept.
+    pub(crate) fn keeps_values_of(&self, codec: &WindowCodec, entry: &BlockEntry, frames: &[usize]) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key_of_values(codec, entry, frames)))
+    }
+
+    fn key_of_values(&self, codec: &WindowCodec, entry: &BlockEntry, frames: &[usize]) -> DecodedKey {
+        let (frames, of) = (frames.to_vec(), PartsRead::new(codec, entry));
+        self.key(entry, DecodedForm::Values { frames, of })
+    }
+
     fn key_of_coefficients(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> DecodedKey {
-        let parts = entry.parts.iter().map(|part| part.kind).collect();
-        let (wanted, begins_above) = (wanted.to_vec(), entry.begins_above(codec.tiers()));
-        self.key(entry, DecodedForm::Coefficients { wanted, parts, begins_above })
+        let (wanted, of) = (wanted.to_vec(), PartsRead::new(codec, entry));
+        self.key(entry, DecodedForm::Coefficients { wanted, of })
     }
 
     fn key(&self, entry: &BlockEntry, form: DecodedForm) -> DecodedKey {

@@ -25,7 +25,7 @@ pub mod resume;
 pub mod merge;
 
 pub use coefficient_file::{CoefficientFile, time_labels};
-pub(crate) use decoded::DecodedBlock;
+pub(crate) use decoded::{BlockValues, DecodedBlock};
 pub use fetch::Prefetch;
 pub use keep::BlockSamples;
 pub use promise::setting;

@@ -1,7 +1,7 @@
-//! A decoded block of a file: its values in the planes of a batch plan.
+//! A decoded block of a file: its coefficients, samples or values in the planes of a batch plan.
 
 use super::batch_plan::{BatchPlan, SplatSource};
-use crate::file::DecodedBlock;
+use crate::file::{BlockValues, DecodedBlock};
 use crate::render::batches::{BlockPlanes, PlaneValues, Scratch};
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
@@ -25,8 +25,6 @@ pub(super) struct CodedBlock<'a> {
 enum Dense {
     /// Decoded samples of the plan's frames: `frame * voxels + voxel` in the window.
     Samples(Buffer<u8>),
-    /// Values of the plan's frames, computed from the coefficients: `frame * voxels + voxel`; empty if all are zero.
-    Values(Vec<f64>),
     /// Coefficients, which are those of the decoded block.
     Coefficients,
 }
@@ -39,12 +37,8 @@ impl<'a> CodedBlock<'a> {
             let dense = Dense::Samples(block.samples_of(&plan.codec, &plan.wanted));
             return Self { plan, decoded, errors, dense, few: Vec::new() };
         }
-        let mut few = overrides(plan, block, field.as_ref());
-        let dense = match plan.by_values {
-            true => Dense::Values(values(plan, block, field.as_ref(), &mut few)),
-            false => Dense::Coefficients,
-        };
-        Self { plan, decoded, errors, dense, few }
+        let few = overrides(plan, block, field.as_ref());
+        Self { plan, decoded, errors, dense: Dense::Coefficients, few }
     }
 
     fn block(&self) -> &Block {
@@ -87,7 +81,6 @@ impl BlockPlanes for CodedBlock<'_> {
     fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         let Self { plan, decoded, errors, dense, few } = self;
         let DecodedBlock { block, field } = decoded.as_ref();
-        let voxels = block.voxels;
         if let Some(error) = plane.checked_sub(plan.layout.first_error()) {
             return Ok(self.plane_of_errors(errors[error], scratch));
         }
@@ -95,7 +88,6 @@ impl BlockPlanes for CodedBlock<'_> {
             few.get(plane).filter(|few| !few.is_empty()).map_or(PlaneValues::Nothing, |few| PlaneValues::Few(few));
         Ok(match dense {
             Dense::Samples(samples) => self.plane_of_samples(samples, plane, scratch),
-            Dense::Values(values) => values.get(plane * voxels..(plane + 1) * voxels).map_or(few, PlaneValues::Double),
             Dense::Coefficients if plane < plan.layout.coefficients => {
                 coefficients(plan, block, field.as_ref(), plan.kept[plane], scratch)
             }
@@ -108,6 +100,33 @@ impl BlockPlanes for CodedBlock<'_> {
         let nonzero = if coded { self.block().codes.nonzero() } else { 0 };
         [nonzero as u64, self.block().bytes_read]
     }
+}
+
+/// The values of a block in the planes of a plan by values.
+pub(super) struct ValuePlanes(pub(super) Arc<BlockValues>);
+
+impl BlockPlanes for ValuePlanes {
+    fn voxels(&self) -> usize {
+        self.0.voxels
+    }
+
+    fn plane<'a>(&'a self, plane: usize, _: &'a mut Scratch) -> Result<PlaneValues<'a>> {
+        let BlockValues { voxels, dense, few, .. } = &*self.0;
+        let few = few.get(plane).filter(|few| !few.is_empty());
+        let dense = dense.get(plane * voxels..(plane + 1) * voxels).map(PlaneValues::Double);
+        Ok(dense.or(few.map(|few| PlaneValues::Few(few))).unwrap_or(PlaneValues::Nothing))
+    }
+
+    fn held(&self) -> [u64; 2] {
+        self.0.held
+    }
+}
+
+/// The values of a block that is not stored exactly, in the frames of a plan.
+pub(super) fn values_of(plan: &BatchPlan, DecodedBlock { block, field }: &DecodedBlock) -> BlockValues {
+    let mut few = overrides(plan, block, field.as_ref());
+    let dense = values(plan, block, field.as_ref(), &mut few);
+    BlockValues { voxels: block.voxels, dense, few, held: [block.codes.nonzero() as u64, block.bytes_read] }
 }
 
 /// The coefficients of one k of a block.

@@ -3,12 +3,12 @@
 //! (eq 4).
 
 use super::batch_plan::{BatchPlan, SplatSource};
-use super::coded::CodedBlock;
+use super::coded::{CodedBlock, ValuePlanes, values_of};
 use super::needs::FileNeeds;
 use super::overview;
 use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule};
 use crate::file::promise::share_tolerance;
-use crate::file::{CoefficientFile, DecodedBlock, Prefetch};
+use crate::file::{BlockValues, CoefficientFile, DecodedBlock, Prefetch};
 use crate::render::batches::{
     BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout,
     OverviewRequest, SampleErrors, Scene, Selection,
@@ -332,12 +332,19 @@ impl<'a> CoefficientBatch<'a> {
         Ok(())
     }
 
-    /// Decodes a block, and returns it with the errors of its samples.
-    fn read(&self, block: usize) -> Result<(Arc<DecodedBlock>, Vec<f64>)> {
-        let KeptParts { entry, errors, .. } = self.kept(block)?;
+    /// Decodes a block. The file keeps it if `keeps`.
+    fn decoded(&self, entry: &BlockEntry, keeps: bool) -> Result<Arc<DecodedBlock>> {
         let BatchPlan { codec, wanted, what, .. } = &self.plan;
-        let splats_coefficients = *what == SplatSource::Coefficients;
-        Ok((self.file.decoded(codec, &entry, &wanted.coefficients, splats_coefficients)?, errors))
+        self.file.decoded(codec, entry, &wanted.coefficients, *what == SplatSource::Coefficients, keeps)
+    }
+
+    /// The values of a block that is not stored exactly.
+    fn values(&self, entry: &BlockEntry) -> Result<Arc<BlockValues>> {
+        let (plan, frames) = (&self.plan, &self.plan.wanted.frames);
+        if !self.file.keeps_values(self.selection.blocks.len(), frames.len()) {
+            return Ok(Arc::new(values_of(plan, &*self.decoded(entry, true)?)));
+        }
+        self.file.values(&plan.codec, entry, frames, || Ok(values_of(plan, &*self.decoded(entry, false)?)))
     }
 }
 
@@ -360,13 +367,20 @@ impl FrameBatch for CoefficientBatch<'_> {
             return Ok(()); // a plan has room for few blocks above at a time
         }
         let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;
-        let decoded_now = next.iter().filter(|entry| !self.file.keeps_coefficients(codec, entry, &wanted.coefficients));
+        let is_kept = |entry: &BlockEntry| {
+            self.file.keeps_coefficients(codec, entry, &wanted.coefficients)
+                || self.plan.by_values && self.file.keeps_values_of(codec, entry, &wanted.frames)
+        };
+        let decoded_now = next.iter().filter(|entry| !is_kept(entry));
         self.file.decode_shared(codec, decoded_now, &wanted.coefficients)
     }
 
     fn planes(&self, block: usize) -> Result<Box<dyn BlockPlanes + '_>> {
-        let (block, errors) = self.read(block)?;
-        Ok(Box::new(CodedBlock::new(&self.plan, block, errors)))
+        let KeptParts { entry, errors, .. } = self.kept(block)?;
+        if self.plan.by_values && !entry.is_exact() {
+            return Ok(Box::new(ValuePlanes(self.values(&entry)?)));
+        }
+        Ok(Box::new(CodedBlock::new(&self.plan, self.decoded(&entry, true)?, errors)))
     }
 
     fn errors(&self) -> &SampleErrors {
