@@ -205,9 +205,9 @@ impl DecodedBlocks {
         }
     }
 
-    /// Whether all of this takes more than the cache has room for.
-    pub(super) fn is_too_small(&self, bytes: usize) -> bool {
-        bytes > self.room
+    /// Whether so many bytes fit in the empty cache.
+    pub(super) fn fits(&self, bytes: usize) -> bool {
+        bytes <= self.room
     }
 
     /// The samples of a block, if they are kept.

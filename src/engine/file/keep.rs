@@ -28,6 +28,9 @@ pub struct BlockSamples {
     pub bytes_read: u64,
 }
 
+/// Values are few if coefficients take this many times their bytes.
+const FEW_BYTES: usize = 4;
+
 impl CoefficientFile {
     /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
     pub fn keeping_decoded(mut self, bytes: usize) -> Self {
@@ -74,13 +77,29 @@ impl CoefficientFile {
         Ok(block)
     }
 
-    /// Whether pictures should keep the values of so many blocks in so many frames, and not their coefficients: these do not fit, but
-    /// values do.
+    /// Whether pictures should keep the values of so many blocks in so many frames first: they fit, and coefficients do not, or take
+    /// several times as much.
     pub(crate) fn keeps_values(&self, blocks: usize, frames: usize) -> bool {
-        let voxels = blocks * self.blocks.region(0).voxels();
-        let [values, coefficients] =
-            [frames * size_of::<f64>(), self.most_coefficients() * self.coefficient_size()].map(|each| each * voxels);
-        self.kept.as_ref().is_some_and(|kept| kept.is_too_small(coefficients) && !kept.is_too_small(values))
+        let [values, coefficients] = [frames * size_of::<f64>(), self.bytes_of_coefficients()];
+        let fits = |each: usize| self.kept.as_ref().is_some_and(|kept| kept.fits(each * self.voxels_of(blocks)));
+        fits(values) && (FEW_BYTES * values <= coefficients || !fits(coefficients))
+    }
+
+    /// Whether pictures should keep the coefficients of so many blocks after all: they fit, and other frames of this one were drawn
+    /// before.
+    pub(crate) fn keeps_coefficients_too(&self, entry: &BlockEntry, blocks: usize) -> bool {
+        let Some(kept) = &self.kept else { return false };
+        kept.is_read_again(entry.id, self.lod) && kept.fits(self.bytes_of_coefficients() * self.voxels_of(blocks))
+    }
+
+    /// Bytes of the coefficients of a voxel.
+    fn bytes_of_coefficients(&self) -> usize {
+        self.most_coefficients() * self.coefficient_size()
+    }
+
+    /// The most voxels of so many blocks.
+    fn voxels_of(&self, blocks: usize) -> usize {
+        blocks * self.blocks.region(0).voxels()
     }
 
     /// The values of a block in some frames, kept or as `make` gives them.

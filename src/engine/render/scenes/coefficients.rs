@@ -340,11 +340,14 @@ impl<'a> CoefficientBatch<'a> {
 
     /// The values of a block that is not stored exactly.
     fn values(&self, entry: &BlockEntry) -> Result<Arc<BlockValues>> {
-        let (plan, frames) = (&self.plan, &self.plan.wanted.frames);
-        if !self.file.keeps_values(self.selection.blocks.len(), frames.len()) {
+        let (plan, frames, blocks) = (&self.plan, &self.plan.wanted.frames, self.selection.blocks.len());
+        if !self.file.keeps_values(blocks, frames.len()) {
             return Ok(Arc::new(values_of(plan, &*self.decoded(entry, true)?)));
         }
-        self.file.values(&plan.codec, entry, frames, || Ok(values_of(plan, &*self.decoded(entry, false)?)))
+        self.file.values(&plan.codec, entry, frames, || {
+            let keeps = self.file.keeps_coefficients_too(entry, blocks);
+            Ok(values_of(plan, &*self.decoded(entry, keeps)?))
+        })
     }
 }
 
