@@ -10,7 +10,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, ConvertConfig, SchemeConstraint};
 use wavesplat::extract::read_region;
 use wavesplat::file::CoefficientFile;
-use wavesplat::render::{CoefficientScene, RenderConfig, SplatSource};
+use wavesplat::render::{CoefficientScene, Mode, RenderConfig, SplatSource};
 use wavesplat::view::camera::View;
 
 const FRAMES: usize = 19;
@@ -63,6 +63,43 @@ fn reads_of_a_file_that_keeps_blocks_are_those_of_one_that_does_not() {
     }
 }
 
+/// Files with blocks above others, whose blocks are large enough for tiny parts to be decoded alone.
+fn files_with_tiers() -> Vec<Stored> {
+    let grid = Grid::unit([35, 20, 33]);
+    let samples = field(&grid, 10, 5);
+    let source: Memory = archive(grid, SampleType::F32, &samples);
+    let file = |basis| {
+        let usual = ConvertConfig::new(2e-2);
+        let coding = SchemeConstraint { basis: Some(basis), ..usual.coding };
+        stored(&mut source.clone(), &ConvertConfig { coding, block: Some(16), window: 8, ..usual })
+    };
+    [Basis::Samples, Basis::Learned].map(file).into()
+}
+
+#[test]
+fn tiny_parts_are_those_of_whole_blocks() {
+    for (stored, lod) in files_with_tiers().iter().flat_map(|stored| [(stored, 0), (stored, 1)]) {
+        let open = || stored.open().with_detail(lod).expect("blocks begin on the lattice");
+        assert!(open().metadata().windows[0].tiers() > 0);
+        let (kept, random, whole) =
+            (ROOMS.map(|room| open().keeping_decoded(room)), &mut Random(3), open().grid.whole());
+        let all = read_region(&open(), 0..10, &whole).expect("samples");
+        for _ in 0..150 {
+            let start = whole.end.map(|n| random.below(n));
+            let end = [0, 1, 2].map(|a| start[a] + 1 + random.below((whole.end[a] - start[a]).min(3)));
+            let (region, first) = (Region { start, end }, random.below(10));
+            let frames = first..first + 1 + random.below(10 - first);
+            let sample = |frame: usize, voxel| all[frame * whole.voxels() + whole.index(voxel)];
+            let expected: Vec<f32> =
+                frames.clone().flat_map(|frame| region.iter().map(move |voxel| sample(frame, voxel))).collect();
+            assert_eq!(read_region(&open(), frames.clone(), &region).expect("samples"), expected, "{region} {lod}");
+            for (kept, room) in kept.iter().zip(ROOMS) {
+                assert_eq!(read_region(kept, frames.clone(), &region).expect("samples"), expected, "{room} {region}");
+            }
+        }
+    }
+}
+
 #[test]
 fn threads_share_the_blocks_that_are_kept() {
     for stored in files() {
@@ -91,7 +128,8 @@ fn a_loop_over_frames_reads_fewer_bytes() {
         let read_all = |file: &CoefficientFile| {
             let region = region.every(1 << lod);
             let frame = |frame: usize| read_region(file, frame..frame + 1, &region).expect("a frame");
-            let samples: Vec<Vec<f32>> = (0..FRAMES).chain([3, 4, 2, 5, 6, 7, 8]).map(frame).collect();
+            let samples: Vec<Vec<f32>> =
+                [11, 4].into_iter().chain(0..FRAMES).chain([3, 4, 2, 5, 6, 7, 8]).map(frame).collect();
             (samples, file.bytes_read())
         };
         let (plain, bytes) = read_all(&open());
@@ -112,13 +150,27 @@ struct Look {
     lod: u32,
     allowed: Option<f64>,
     what: SplatSource,
+    /// None for all.
+    frame: Option<usize>,
+    /// Whether pictures show largest values.
+    peaks: bool,
 }
 
-const FRONT: Look = Look { angle: 10.0, lod: 0, allowed: None, what: SplatSource::Coefficients };
+const FRONT: Look =
+    Look { angle: 10.0, lod: 0, allowed: None, what: SplatSource::Coefficients, frame: None, peaks: false };
 const SIDE: Look = Look { angle: 80.0, ..FRONT };
+const SIXTH: Look = Look { frame: Some(5), ..FRONT };
 
 /// One after another.
-const LOOKS: [Look; 6] = [
+const LOOKS: [Look; 14] = [
+    SIXTH,
+    Look { angle: 80.0, ..SIXTH },
+    Look { frame: Some(6), ..SIXTH },
+    Look { peaks: true, ..SIXTH },
+    Look { peaks: true, ..FRONT },
+    Look { peaks: true, ..SIXTH },
+    Look { allowed: Some(0.02), ..SIXTH },
+    Look { lod: 1, ..SIXTH },
     FRONT,
     SIDE,
     Look { lod: 1, ..SIDE },
@@ -129,18 +181,21 @@ const LOOKS: [Look; 6] = [
 
 /// The bits of the pictures of a file.
 fn drawn(file: &CoefficientFile, look: Look) -> Vec<u32> {
-    let Look { angle, lod, allowed, what } = look;
+    let Look { angle, lod, allowed, what, frame, peaks } = look;
     let lod = file.coarsest_detail().min(lod);
     let mut scene = CoefficientScene::new(file.clone().with_detail(lod).expect("a level"), what);
     let view = View { size: [30, 20], ..View::new(angle, 20.0) };
-    let config = RenderConfig { allowed, ..RenderConfig::new(&scene, view) };
+    let usual = RenderConfig::new(&scene, view);
+    let mode = if peaks { Mode::Mip { slices: None } } else { usual.mode.clone() };
+    let frames = frame.map_or(usual.frames.clone(), |frame| vec![frame]);
+    let config = RenderConfig { allowed, mode, frames, ..usual };
     pictures(&mut scene, &config).0.iter().map(|v| v.to_bits()).collect()
 }
 
 #[test]
 fn pictures_of_a_file_that_keeps_blocks_are_those_of_one_that_does_not() {
     // Coefficients of learned functions are kept like those of Haar functions.
-    for stored in &files()[..3] {
+    for stored in files()[..3].iter().chain(&files_with_tiers()) {
         let kept = ROOMS.map(|room| stored.open().keeping_decoded(room));
         for look in LOOKS {
             let plain = drawn(&stored.open(), look);

@@ -20,19 +20,23 @@ const LARGE: usize = 4 << 20;
 impl<T: Pod> Zeroed<T> {
     /// A buffer of `len` zeros.
     pub fn new(len: usize) -> Self {
-        let zeros = Self::in_small_pages(len);
-        #[cfg(target_os = "linux")]
-        if let Self::Map(map, _) = &zeros {
-            let _ = map.advise(memmap2::Advice::HugePage); // advice only: a system without huge pages is slower
-        }
-        zeros
+        Self::in_pages(len, true)
     }
 
-    /// The same in small pages, for a buffer of which little is written.
+    /// The same for a buffer of which little is written: a large one lies in small pages, and those that are not written cost nothing.
     pub fn in_small_pages(len: usize) -> Self {
+        Self::in_pages(len, false)
+    }
+
+    fn in_pages(len: usize, are_huge: bool) -> Self {
         let bytes = len * size_of::<T>();
         let map = if bytes >= LARGE { MmapMut::map_anon(bytes).ok() } else { None };
-        map.map_or_else(|| Self::Heap(vec![T::zeroed(); len]), |map| Self::Map(map, len))
+        let Some(map) = map else { return Self::Heap(vec![T::zeroed(); len]) };
+        // Advice only: a system that does not take it is slower.
+        #[cfg(target_os = "linux")]
+        let _ = map.advise(if are_huge { memmap2::Advice::HugePage } else { memmap2::Advice::NoHugePage });
+        let _ = are_huge; // of no use elsewhere
+        Self::Map(map, len)
     }
 
     /// Sets every byte of all numbers.

@@ -6,50 +6,48 @@ use std::sync::{Mutex, PoisonError};
 
 /// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. A buffer takes
 /// a spare one of at most twice its length, so the pool holds no more than buffers of each size and its half had at one time. Only
-/// blocks and boxes of trials use buffers, so their sizes are few.
+/// blocks and boxes of trials use buffers, so their sizes are few. Copies that are kept, and parts, go back to the system.
 #[derive(Debug, Default)]
 pub struct Buffer<T: Pooled> {
     /// At least `len` values; the rest has been used before.
     values: Zeroed<T>,
     len: usize,
-    /// Whether the memory goes back to the system instead: later buffers would be slower in small pages.
-    is_in_small_pages: bool,
+    /// Whether the memory goes back to the system instead.
+    is_single: bool,
 }
 
 impl<T: Pooled> Buffer<T> {
     /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and at most twice
     /// as long, or a new one.
     pub fn with_len(len: usize) -> Self {
-        Self::take_spare(len, 2 * len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
+        Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
     }
 
-    /// The same for a slice of which few entries are used: those of fresh memory that are not cost nothing.
+    /// The same for a slice of which few entries are used. Fresh memory goes back to the system: it is in small pages.
     pub fn for_part(len: usize) -> Self {
-        Self::take_spare(len, 2 * len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
+        Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
     }
 
-    /// A copy that is kept: its memory has just its length.
+    /// A copy that is kept for long: its memory has just its length, and goes back to the system.
     pub fn to_keep(values: &[T]) -> Self {
-        let len = values.len();
-        let mut copy = Self::take_spare(len, len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false));
+        let mut copy = Self::new(Zeroed::new(values.len()), values.len(), true);
         copy.copy_from_slice(values);
         copy
     }
 
-    /// A spare slice of at most `most` entries.
-    fn take_spare(len: usize, most: usize) -> Option<Self> {
+    fn take_spare(len: usize) -> Option<Self> {
         let mut spare = spare::<T>();
-        let fits = (0..spare.len()).filter(|n| (len..=most).contains(&spare[*n].len()));
+        let fits = (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len()));
         let values = fits.min_by_key(|n| spare[*n].len()).map(|n| spare.swap_remove(n));
         drop(spare);
         values.map(|values| Self::new(values, len, false))
     }
 
-    fn new(mut values: Zeroed<T>, len: usize, is_in_small_pages: bool) -> Self {
+    fn new(mut values: Zeroed<T>, len: usize, is_single: bool) -> Self {
         if cfg!(debug_assertions) {
             values.fill_bytes(0xFF); // tests then fail if they use a value that was not written: NaN or -1
         }
-        Self { values, len, is_in_small_pages }
+        Self { values, len, is_single }
     }
 
     /// Bytes of memory that it takes: it may be longer than what is used of it.
@@ -80,7 +78,7 @@ impl<T: Pooled> Clone for Buffer<T> {
 
 impl<T: Pooled> Drop for Buffer<T> {
     fn drop(&mut self) {
-        if !(self.values.is_empty() || self.is_in_small_pages) {
+        if !(self.values.is_empty() || self.is_single) {
             spare::<T>().push(std::mem::take(&mut self.values));
         }
     }

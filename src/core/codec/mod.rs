@@ -164,11 +164,10 @@ impl WindowCodec {
         if self.is_all_above() { self.decoded_size(size) } else { above.decoded_size(size) }
     }
 
-    /// The part of the nodes that a block of `size` voxels begins with on which the nodes of `part` depend. The block begins with
-    /// `width` nodes along x.
-    pub fn needed_above(&self, size: [usize; 3], part: &Region, width: usize) -> Region {
+    /// The part of the nodes that a block of `size` voxels begins with on which the nodes of `part` depend.
+    pub fn needed_above(&self, size: [usize; 3], part: &Region) -> Region {
         match &self.scheme.pyramid {
-            Some(pyramid) if !self.is_all_above() => self.passes(pyramid, size).within(part).needed_above(width),
+            Some(pyramid) if !self.is_all_above() => self.passes(pyramid, size).within(part).needed_above(),
             _ => *part,
         }
     }

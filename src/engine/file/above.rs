@@ -186,11 +186,6 @@ impl PlaceAbove {
         let moved = |of: [usize; 3]| std::array::from_fn(|axis| self.start[axis] + of[axis]);
         Region { start: moved(part.start), end: moved(part.end) }
     }
-
-    /// The block's nodes along x.
-    pub(super) fn width(&self) -> usize {
-        self.size[0]
-    }
 }
 
 /// Bytes of the decoded nodes of a block above others; 0 without tiers.

@@ -37,8 +37,8 @@ pub(crate) struct BlockValues {
 
 impl BlockValues {
     fn bytes(&self) -> usize {
-        let few: usize = self.few.iter().map(|few| size_of_val(&few[..])).sum();
-        size_of_val(&self.dense[..]) + few
+        let few: usize = self.few.iter().map(Vec::capacity).sum();
+        size_of_val(&self.dense[..]) + few * size_of::<(u32, f64)>()
     }
 }
 
@@ -55,8 +55,8 @@ pub(super) struct DecodedKey {
 pub(super) enum DecodedForm {
     /// The coefficients that are marked.
     Coefficients { wanted: Vec<bool>, of: PartsRead },
-    /// Values in some frames.
-    Values { frames: Vec<usize>, of: PartsRead },
+    /// Values in some frames, made by one of two sums.
+    Values { frames: Vec<usize>, by_coefficients: bool, of: PartsRead },
     /// All coefficients of the window.
     All,
     /// All samples of the window.
@@ -87,7 +87,7 @@ enum Decoded {
     Samples(Arc<Buffer<u8>>),
 }
 
-/// A cache of decoded blocks. A new block replaces the least recently used ones, but none that the previous run used: so a
+/// A cache of decoded blocks. A new block replaces the least recently used ones, but none that the previous run used (frames read ahead make room for the next ones): so a
 /// run over more blocks than fit still finds some of them.
 #[derive(Debug)]
 pub(super) struct DecodedBlocks {
@@ -98,20 +98,41 @@ pub(super) struct DecodedBlocks {
 #[derive(Debug, Default)]
 struct Kept {
     entries: HashMap<DecodedKey, Entry>,
-    /// Blocks that were read.
-    seen: HashSet<(BlockId, u32)>,
+    /// Blocks of which samples were read, and that were drawn.
+    read: HashSet<(BlockId, u32)>,
+    drawn: HashSet<(BlockId, u32)>,
     bytes: usize,
     run: u64,
-    /// The channel and region that were read last, and the frame after those.
-    last: Option<(usize, Region, usize)>,
-    ahead: Ahead,
+    /// What was read last, and by which run.
+    last: Option<(u64, FramesRead)>,
+    /// What a loop reads soon.
+    ahead: Option<FramesRead>,
 }
 
-/// Frames that a loop reads soon: their number in the file, of a channel and region.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-struct Ahead {
-    of: Option<(usize, Region)>,
-    frames: Range<usize>,
+/// Frames of a region, as numbers in the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FramesRead {
+    pub(super) channel: usize,
+    pub(super) region: Region,
+    pub(super) frames: Range<usize>,
+}
+
+impl FramesRead {
+    /// The same region in other frames.
+    fn with_frames(&self, frames: Range<usize>) -> Self {
+        Self { frames, ..self.clone() }
+    }
+
+    /// Whether a read of `self` after one of `other` may be a step of a loop.
+    fn follows(&self, other: &Self) -> bool {
+        *self == other.with_frames(self.frames.clone()) && self.frames.start == other.frames.end
+    }
+
+    fn is_within(&self, other: &Self) -> bool {
+        *self == other.with_frames(self.frames.clone())
+            && other.frames.start <= self.frames.start
+            && self.frames.end <= other.frames.end
+    }
 }
 
 #[derive(Debug)]
@@ -122,7 +143,7 @@ struct Entry {
     used: u64,
 }
 
-/// The largest number of blocks in `seen`; with more, the set begins anew.
+/// The largest number of blocks in `read` and in `drawn`; with more, a set begins anew.
 const MOST_SEEN: usize = 1 << 16;
 
 impl DecodedBlocks {
@@ -145,43 +166,42 @@ impl DecodedBlocks {
         self.kept().run += 1;
     }
 
-    /// Whether a block was read before. It is remembered.
+    /// Whether samples of a block were read before. It is remembered.
     pub(super) fn is_read_again(&self, id: BlockId, lod: u32) -> bool {
-        let seen = &mut self.kept().seen;
-        if seen.len() >= MOST_SEEN {
-            seen.clear();
-        }
-        !seen.insert((id, lod))
+        is_met_again(&mut self.kept().read, (id, lod))
     }
 
-    /// Whether a block was read before.
+    /// Whether a block was drawn before. It is remembered.
+    pub(super) fn is_drawn_again(&self, id: BlockId, lod: u32) -> bool {
+        is_met_again(&mut self.kept().drawn, (id, lod))
+    }
+
+    /// Whether samples of a block were read before.
     pub(super) fn was_read(&self, id: BlockId, lod: u32) -> bool {
-        self.kept().seen.contains(&(id, lod))
+        self.kept().read.contains(&(id, lod))
     }
 
-    /// The frames that a read of some of them decodes and keeps together: as many as there is room for, if the read goes on with the
-    /// frame after those of the last read, and not all of the window's frames fit. Each takes `bytes`.
-    pub(super) fn ahead(
-        &self,
-        [channel, bytes]: [usize; 2],
-        region: &Region,
-        frames: &Range<usize>,
-        of_window: &Range<usize>,
-    ) -> Option<Range<usize>> {
-        let (mut kept, most) = (self.kept(), self.room / bytes.max(1));
-        let goes_on = kept.last == Some((channel, *region, frames.start));
-        kept.last = Some((channel, *region, frames.end));
-        let is_ahead = kept.ahead.of == Some((channel, *region));
-        if is_ahead && kept.ahead.frames.start <= frames.start && frames.end <= kept.ahead.frames.end {
-            return Some(kept.ahead.frames.clone());
+    /// The frames that a read of some of them decodes and keeps together: as many as there is room for, if it goes on with the
+    /// frame after those that an earlier run read last, and not all of the window's frames fit. Each takes `bytes`.
+    pub(super) fn ahead(&self, read: &FramesRead, bytes: usize, of_window: &Range<usize>) -> Option<Range<usize>> {
+        let (mut kept, bytes) = (self.kept(), bytes.max(1));
+        let run = kept.run;
+        let goes_on = kept.last.as_ref().is_some_and(|(before, last)| *before < run && read.follows(last));
+        kept.last = Some((run, read.clone()));
+        if let Some(ahead) = kept.ahead.as_ref().filter(|ahead| read.is_within(ahead)) {
+            return Some(ahead.frames.clone());
         }
-        if !goes_on || most >= of_window.len() || most <= frames.len() {
+        if !goes_on || bytes * of_window.len() <= self.room {
             return None;
         }
         kept.forget_frames();
-        let ahead = frames.start..of_window.end.min(frames.start + most);
-        kept.ahead = Ahead { of: Some((channel, *region)), frames: ahead.clone() };
-        Some(ahead)
+        let most = self.room.saturating_sub(kept.bytes - kept.old_bytes()) / bytes;
+        let ahead = read.with_frames(read.frames.start..of_window.end.min(read.frames.start + most));
+        if most <= read.frames.len() {
+            return None;
+        }
+        kept.ahead = Some(ahead.clone());
+        Some(ahead.frames)
     }
 
     /// Whether something of a block is kept. This is no use of it.
@@ -221,8 +241,7 @@ impl DecodedBlocks {
     /// Whether so many bytes can be kept.
     pub(super) fn has_room(&self, bytes: usize) -> bool {
         let kept = self.kept();
-        let old = kept.old().map(|(_, entry)| entry.bytes).sum::<usize>();
-        kept.bytes - old + bytes <= self.room
+        kept.bytes - kept.old_bytes() + bytes <= self.room
     }
 
     /// Keeps a block if there is room.
@@ -255,8 +274,13 @@ impl Kept {
         self.entries.iter().filter(|(_, entry)| entry.used + 1 < self.run)
     }
 
+    fn old_bytes(&self) -> usize {
+        self.old().map(|(_, entry)| entry.bytes).sum()
+    }
+
     /// Drops what was read ahead.
     fn forget_frames(&mut self) {
+        self.ahead = None;
         let is_ahead = |key: &DecodedKey| matches!(key.form, DecodedForm::Frames(_));
         let dropped = self.entries.extract_if(|key, _| is_ahead(key));
         self.bytes -= dropped.map(|(_, entry)| entry.bytes).sum::<usize>();
@@ -282,6 +306,14 @@ impl Kept {
     }
 }
 
+/// Whether a set has a block. Adds it.
+fn is_met_again(set: &mut HashSet<(BlockId, u32)>, block: (BlockId, u32)) -> bool {
+    if set.len() >= MOST_SEEN {
+        set.clear();
+    }
+    !set.insert(block)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -301,8 +333,11 @@ mod tests {
     #[test]
     fn reads_go_on_with_frames_that_fit() {
         let blocks = DecodedBlocks::new(100);
-        let box_of = |end| Region { start: [0; 3], end: [end; 3] };
-        let ahead = |bytes, end, frames| blocks.ahead([0, bytes], &box_of(end), &frames, &(8..20));
+        let ahead = |bytes, end, frames| {
+            blocks.begin_run();
+            let region = Region { start: [0; 3], end: [end; 3] };
+            blocks.ahead(&FramesRead { channel: 0, region, frames }, bytes, &(8..20))
+        };
         assert_eq!(ahead(30, 2, 8..9), None, "a first read");
         assert_eq!(ahead(30, 2, 9..10), Some(9..12));
         assert_eq!(ahead(30, 2, 10..11), Some(9..12));
@@ -314,6 +349,14 @@ mod tests {
         assert_eq!(ahead(30, 3, 19..20), Some(19..20), "the last of the window");
         assert_eq!(ahead(8, 3, 8..9), None);
         assert_eq!(ahead(8, 3, 9..10), None, "the whole window fits");
+        blocks.keep_samples(key(7), &Arc::new(Buffer::to_keep(&[0; 40])));
+        ahead(30, 4, 8..9);
+        assert!(blocks.samples(&key(7)).is_some());
+        assert_eq!(ahead(30, 4, 9..10), Some(9..11), "beside what the last run used");
+        let twice = FramesRead { channel: 0, region: Region { start: [0; 3], end: [5; 3] }, frames: 8..9 };
+        blocks.begin_run();
+        let next = FramesRead { frames: 9..10, ..twice.clone() };
+        assert_eq!([&twice, &next].map(|read| blocks.ahead(read, 30, &(8..20))), [None, None], "one run");
     }
 
     #[test]

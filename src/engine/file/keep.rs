@@ -1,7 +1,7 @@
 //! Decoding blocks of a file that keeps some decoded.
 
 use super::coefficient_file::CoefficientFile;
-use super::decoded::{BlockValues, DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey, PartsRead};
+use super::decoded::{BlockValues, DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey, FramesRead, PartsRead};
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
@@ -18,8 +18,19 @@ const SMALL: usize = 4;
 /// A tiny part takes the time of at most one in so many: it is decoded from coefficients even if its block is read often.
 const TINY: usize = 64;
 
+/// Values are few if coefficients take this many times their bytes.
+const FEW_VALUES: usize = 4;
+
+/// Frames of a picture, counted from the first of their window.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FramesDrawn<'a> {
+    pub(crate) frames: &'a [usize],
+    /// Whether coefficients are added one by one, which rounds otherwise than the inverse transform.
+    pub(crate) by_coefficients: bool,
+}
+
 /// Samples of a block.
-pub struct BlockSamples {
+pub struct SamplesOfBlock {
     /// `frame * voxels + voxel`.
     pub samples: Arc<Buffer<u8>>,
     /// The number of the first frame in its window.
@@ -27,9 +38,6 @@ pub struct BlockSamples {
     /// The stored bytes read.
     pub bytes_read: u64,
 }
-
-/// Values are few if coefficients take this many times their bytes.
-const FEW_BYTES: usize = 4;
 
 impl CoefficientFile {
     /// The file with up to so many bytes of blocks that stay decoded for later pictures and reads. Clones share them.
@@ -82,14 +90,14 @@ impl CoefficientFile {
     pub(crate) fn keeps_values(&self, blocks: usize, frames: usize) -> bool {
         let [values, coefficients] = [frames * size_of::<f64>(), self.bytes_of_coefficients()];
         let fits = |each: usize| self.kept.as_ref().is_some_and(|kept| kept.fits(each * self.voxels_of(blocks)));
-        fits(values) && (FEW_BYTES * values <= coefficients || !fits(coefficients))
+        fits(values) && (FEW_VALUES * values <= coefficients || !fits(coefficients))
     }
 
     /// Whether pictures should keep the coefficients of so many blocks after all: they fit, and other frames of this one were drawn
     /// before.
     pub(crate) fn keeps_coefficients_too(&self, entry: &BlockEntry, blocks: usize) -> bool {
         let Some(kept) = &self.kept else { return false };
-        kept.is_read_again(entry.id, self.lod) && kept.fits(self.bytes_of_coefficients() * self.voxels_of(blocks))
+        kept.is_drawn_again(entry.id, self.lod) && kept.fits(self.bytes_of_coefficients() * self.voxels_of(blocks))
     }
 
     /// Bytes of the coefficients of a voxel.
@@ -107,7 +115,7 @@ impl CoefficientFile {
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        frames: &[usize],
+        frames: FramesDrawn<'_>,
         make: impl FnOnce() -> Result<BlockValues>,
     ) -> Result<Arc<BlockValues>> {
         let Some(kept) = &self.kept else { return make().map(Arc::new) };
@@ -126,9 +134,11 @@ impl CoefficientFile {
         let (kept, of_window) = (self.kept.as_ref()?, self.window_range(window));
         let voxels: usize = self.blocks.touching(region).map(|block| self.blocks.region(block).voxels()).sum();
         let (first, last) = (*frames.first()?, *frames.last()?);
-        let is_run = frames.len() == last + 1 - first;
-        let bytes = voxels * self.sample().size();
-        let ahead = kept.ahead([channel, bytes], region, &(first..last + 1), &of_window).filter(|_| is_run)?;
+        if frames.len() != last + 1 - first {
+            return None;
+        }
+        let read = FramesRead { channel, region: *region, frames: first..last + 1 };
+        let ahead = kept.ahead(&read, voxels * self.sample().size(), &of_window)?;
         Some(ahead.start - of_window.start..ahead.end - of_window.start)
     }
 
@@ -142,19 +152,19 @@ impl CoefficientFile {
         wanted: &WantedFrames,
         ahead: Option<&WantedFrames>,
         is_part: bool,
-    ) -> Result<BlockSamples> {
+    ) -> Result<SamplesOfBlock> {
         let decode = |wanted: &WantedFrames| {
             let block = self.block(codec, entry, &wanted.coefficients)?;
             let samples = Arc::new(block.samples_of(codec, wanted));
-            Ok(BlockSamples { samples, first: 0, bytes_read: block.bytes_read })
+            Ok(SamplesOfBlock { samples, first: 0, bytes_read: block.bytes_read })
         };
         let Some(kept) = &self.kept else { return decode(wanted) };
         let key = self.key(entry, DecodedForm::Samples);
         if let Some(samples) = kept.samples(&key) {
-            return Ok(BlockSamples { samples, first: 0, bytes_read: 0 });
+            return Ok(SamplesOfBlock { samples, first: 0, bytes_read: 0 });
         }
         if let Some(ahead) = ahead {
-            return self.samples_ahead(codec, entry, ahead, decode);
+            return self.samples_ahead(codec, entry, kept, [wanted, ahead], decode);
         }
         let is_whole = wanted.frames.len() == codec.frames();
         let is_again = kept.is_read_again(entry.id, self.lod);
@@ -167,29 +177,33 @@ impl CoefficientFile {
         Ok(decoded)
     }
 
-    /// The samples of some frames of a block, kept or decoded now.
+    /// The samples of the frames ahead of a block, kept or decoded now; of the wanted frames if there is no room for all.
     fn samples_ahead(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
-        ahead: &WantedFrames,
-        decode: impl FnOnce(&WantedFrames) -> Result<BlockSamples>,
-    ) -> Result<BlockSamples> {
+        kept: &DecodedBlocks,
+        [wanted, ahead]: [&WantedFrames; 2],
+        decode: impl FnOnce(&WantedFrames) -> Result<SamplesOfBlock>,
+    ) -> Result<SamplesOfBlock> {
         let (first, count) = (ahead.frames[0], ahead.frames.len());
-        let (kept, key) = (self.kept.as_ref(), self.key(entry, form_of(ahead)));
-        if let Some(samples) = kept.and_then(|kept| kept.samples(&key)) {
-            return Ok(BlockSamples { samples, first, bytes_read: 0 });
+        let key = self.key(entry, form_of(ahead));
+        if let Some(samples) = kept.samples(&key) {
+            return Ok(SamplesOfBlock { samples, first, bytes_read: 0 });
         }
-        let BlockSamples { samples, bytes_read, .. } = decode(ahead)?;
         let size = self.decoded_voxels(codec, entry)? * codec.sample.size();
+        if !kept.has_room(count * size) {
+            return decode(wanted);
+        }
+        let SamplesOfBlock { samples, bytes_read, .. } = decode(ahead)?;
         let samples = Arc::new(Buffer::to_keep(&samples[first * size..(first + count) * size]));
-        kept.iter().for_each(|kept| kept.keep_samples(key.clone(), &samples));
-        Ok(BlockSamples { samples, first, bytes_read })
+        kept.keep_samples(key, &samples);
+        Ok(SamplesOfBlock { samples, first, bytes_read })
     }
 
     /// The samples of some frames in a part of a block, frame after frame, x fastest, and the stored bytes read. None if the part is
-    /// not small, the block not [divisible](is_divisible), or its samples are kept, and if frames repeat. Uses the cache, and adds the
-    /// block's coefficients as [`Self::samples`] adds samples.
+    /// not small, the block not [divisible](is_divisible), or its samples are kept, and if frames repeat. Uses the cache. It takes the
+    /// block's coefficients if samples are read again, or at once for all frames of a part that is not tiny.
     pub fn samples_of_part(
         &self,
         codec: &WindowCodec,
@@ -292,13 +306,14 @@ impl CoefficientFile {
     }
 
     /// Whether the values of a block are kept.
-    pub(crate) fn keeps_values_of(&self, codec: &WindowCodec, entry: &BlockEntry, frames: &[usize]) -> bool {
+    pub(crate) fn keeps_values_of(&self, codec: &WindowCodec, entry: &BlockEntry, frames: FramesDrawn<'_>) -> bool {
         self.kept.as_ref().is_some_and(|kept| kept.has(&self.key_of_values(codec, entry, frames)))
     }
 
-    fn key_of_values(&self, codec: &WindowCodec, entry: &BlockEntry, frames: &[usize]) -> DecodedKey {
+    fn key_of_values(&self, codec: &WindowCodec, entry: &BlockEntry, frames: FramesDrawn<'_>) -> DecodedKey {
+        let FramesDrawn { frames, by_coefficients } = frames;
         let (frames, of) = (frames.to_vec(), PartsRead::new(codec, entry));
-        self.key(entry, DecodedForm::Values { frames, of })
+        self.key(entry, DecodedForm::Values { frames, by_coefficients, of })
     }
 
     fn key_of_coefficients(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> DecodedKey {

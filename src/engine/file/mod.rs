@@ -27,5 +27,6 @@ pub mod merge;
 pub use coefficient_file::{CoefficientFile, time_labels};
 pub(crate) use decoded::{BlockValues, DecodedBlock};
 pub use fetch::Prefetch;
-pub use keep::BlockSamples;
+pub(crate) use keep::FramesDrawn;
+pub use keep::SamplesOfBlock;
 pub use promise::setting;

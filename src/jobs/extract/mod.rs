@@ -27,7 +27,7 @@ use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::zeroed::Zeroed;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::WantedFrames;
-use wavesplat_engine::file::{BlockSamples, CoefficientFile};
+use wavesplat_engine::file::{CoefficientFile, SamplesOfBlock};
 use wavesplat_format::BlockEntry;
 
 /// What to extract. [`ExtractConfig::new`] asks for everything; narrow it by struct update.
@@ -252,8 +252,7 @@ impl Group<'_> {
     /// Reads the samples of a piece in frames of one window.
     fn read_window(&self, frames: &[usize], target: &Target, out: &mut [u8], report: &mut ExtractReport) -> Result<()> {
         let (file, at_once) = (self.file, self.blocks);
-        let of = InWindow::new(file, frames)?;
-        let InWindow { window, codec, wanted } = &of;
+        let InWindow { window, codec, wanted } = &InWindow::new(file, frames)?;
         let (is_part, numbers) = (target.region != file.grid.whole(), (0..frames.len()).collect::<Vec<usize>>());
         let ahead = file.read_ahead(*window, self.config.channel, &target.region, frames);
         let ahead = ahead.map(|frames| WantedFrames::new(codec, frames.collect()));
@@ -267,7 +266,7 @@ impl Group<'_> {
                 target.copy(codec, &numbers, &shared, &samples, &mut out());
                 return Ok(bytes_read);
             }
-            let BlockSamples { samples, first, bytes_read } =
+            let SamplesOfBlock { samples, first, bytes_read } =
                 file.samples(codec, entry, wanted, ahead.as_ref(), is_part)?;
             let frames: Vec<usize> = wanted.frames.iter().map(|frame| frame - first).collect();
             target.copy(codec, &frames, &region, &samples, &mut out());
@@ -277,9 +276,10 @@ impl Group<'_> {
             let entries = entries?;
             for group in file.by_shared(&entries) {
                 self.progress.check()?;
-                file.fetch_blocks(codec, group.iter().copied(), &decoded.coefficients)?;
-                let sharing = self.sharing(codec, &group, target, ahead.as_ref())?;
-                file.decode_shared(codec, sharing, &decoded.coefficients)?;
+                let decoded_now: Vec<&BlockEntry> =
+                    group.iter().copied().filter(|entry| !file.keeps_samples(entry, ahead.as_ref())).collect();
+                file.fetch_blocks(codec, decoded_now.iter().copied(), &decoded.coefficients)?;
+                file.decode_shared(codec, self.sharing(codec, decoded_now, target)?, &decoded.coefficients)?;
                 let is_any = at_once >= rayon::current_num_threads(); // there are no more threads than that
                 for some in group.chunks(if is_any { group.len() } else { at_once }) {
                     report.bytes_read += some.par_iter().map(|entry| read(entry)).sum::<Result<u64>>()?;
@@ -290,16 +290,15 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// The blocks that use whole blocks above: they are decoded now, and not for a tiny part alone.
+    /// Those of some blocks to decode that use whole blocks above: all but those of which a tiny part is decoded alone.
     fn sharing<'e>(
         &self,
         codec: &WindowCodec,
-        group: &[&'e BlockEntry],
+        blocks: Vec<&'e BlockEntry>,
         target: &Target,
-        ahead: Option<&WantedFrames>,
     ) -> Result<Vec<&'e BlockEntry>> {
         let mut sharing = Vec::new();
-        for entry in group.iter().copied().filter(|entry| !self.file.keeps_samples(entry, ahead)) {
+        for entry in blocks {
             let (_, part) = target.shared(&self.file.blocks.region(entry.id.block as usize));
             if !self.file.reads_alone(codec, entry, &part)? {
                 sharing.push(entry);

@@ -86,8 +86,8 @@ impl Place {
     }
 }
 
-/// A box around all known nodes in what is computed after some passes; along x all of `width` nodes.
-pub(super) fn needed<'w>(passes: &[Pass], within: impl Iterator<Item = &'w Within>, width: usize) -> Region {
+/// A box around all known nodes in what is computed after some passes; along x all.
+pub(super) fn needed<'w>(passes: &[Pass], within: impl Iterator<Item = &'w Within>) -> Region {
     let known = passes.iter().zip(within).filter_map(|(pass, within)| Some(Place::new(pass)?.known(within)));
     let known: Vec<[Range<usize>; 2]> = known.collect();
     let along = |of: usize| {
@@ -95,7 +95,7 @@ pub(super) fn needed<'w>(passes: &[Pass], within: impl Iterator<Item = &'w Withi
         ranges.reduce(|all, of| all.start.min(of.start)..all.end.max(of.end)).unwrap_or(0..0)
     };
     let [y, z] = [along(0), along(1)];
-    Region { start: [0, y.start, z.start], end: [width, y.end, z.end] }
+    Region { start: [0, y.start, z.start], end: [passes[0].lattice()[0], y.end, z.end] }
 }
 
 impl<'a, R: Real> KnownNodes<'a, R> {

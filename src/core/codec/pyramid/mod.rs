@@ -107,9 +107,9 @@ impl<'a> PredictionPasses<'a> {
         self
     }
 
-    /// A box around the known nodes that the decoded ones depend on. There are `width` known nodes along x.
-    pub(crate) fn needed_above(&self, width: usize) -> Region {
-        known::needed(&self.passes, self.stages.within(), width)
+    /// A box around the known nodes that the decoded ones depend on.
+    pub(crate) fn needed_above(&self) -> Region {
+        known::needed(&self.passes, self.stages.within())
     }
 
     /// The number of nodes along x, y, z and k.

@@ -52,7 +52,7 @@ pub(super) struct Reach {
     pub(super) rows: Range<usize>,
     /// Nodes of a row; along the fastest axis, lines of a part.
     pub(super) inner: Range<usize>,
-    /// The number of all of these.
+    /// The lines of a part along the fastest axis, computed or not.
     pub(super) width: usize,
 }
 

@@ -216,8 +216,7 @@ fn parts_have_the_nodes_of_whole_blocks() {
         let [x, y, z, _] = passes().nodes();
         let region = some_region([x, y, z], state);
         let narrow = passes().within(&region);
-        let needed =
-            if case.is_last() { Region { start: [0; 3], end: [0; 3] } } else { narrow.needed_above(known.own[0]) };
+        let needed = if case.is_last() { Region { start: [0; 3], end: [0; 3] } } else { narrow.needed_above() };
         let cut = known.cut_part(&needed);
         let part = (!case.is_last()).then_some(Nodes { values: &cut, ..known.nodes() });
         let of_part = decoded(&narrow, listed, part);

@@ -1,6 +1,6 @@
 //! The plan of a frame batch of a coefficient file: which coefficients or values are splatted into which planes.
 
-use crate::file::CoefficientFile;
+use crate::file::{CoefficientFile, FramesDrawn};
 use crate::render::batches::{BatchRequest, Layout, Order};
 use crate::render::config::RenderConfig;
 use wavesplat_core::base::choice::Choice;
@@ -60,6 +60,11 @@ impl BatchPlan {
         let values = what == SplatSource::Samples || by_values;
         let layout = layout(file, &codec, window, request, values, kept.len());
         Ok(Self { what, codec, wanted, kept, by_values, few, layout })
+    }
+
+    /// The frames, and how their values are made.
+    pub(super) fn drawn(&self) -> FramesDrawn<'_> {
+        FramesDrawn { frames: &self.wanted.frames, by_coefficients: self.few }
     }
 }
 

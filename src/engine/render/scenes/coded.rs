@@ -156,7 +156,7 @@ fn values(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, few: &mut 
         put_runs(plan, block, field, &mut values);
     }
     for (few, values) in few.iter_mut().zip(values.chunks_exact_mut(block.voxels)) {
-        few.drain(..).for_each(|(voxel, value)| values[voxel as usize] += value);
+        std::mem::take(few).into_iter().for_each(|(voxel, value)| values[voxel as usize] += value);
     }
     values
 }

@@ -340,11 +340,11 @@ impl<'a> CoefficientBatch<'a> {
 
     /// The values of a block that is not stored exactly.
     fn values(&self, entry: &BlockEntry) -> Result<Arc<BlockValues>> {
-        let (plan, frames, blocks) = (&self.plan, &self.plan.wanted.frames, self.selection.blocks.len());
-        if !self.file.keeps_values(blocks, frames.len()) {
+        let (plan, blocks) = (&self.plan, self.selection.blocks.len());
+        if !self.file.keeps_values(blocks, plan.wanted.frames.len()) {
             return Ok(Arc::new(values_of(plan, &*self.decoded(entry, true)?)));
         }
-        self.file.values(&plan.codec, entry, frames, || {
+        self.file.values(&plan.codec, entry, plan.drawn(), || {
             let keeps = self.file.keeps_coefficients_too(entry, blocks);
             Ok(values_of(plan, &*self.decoded(entry, keeps)?))
         })
@@ -372,7 +372,7 @@ impl FrameBatch for CoefficientBatch<'_> {
         let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;
         let is_kept = |entry: &BlockEntry| {
             self.file.keeps_coefficients(codec, entry, &wanted.coefficients)
-                || self.plan.by_values && self.file.keeps_values_of(codec, entry, &wanted.frames)
+                || self.plan.by_values && self.file.keeps_values_of(codec, entry, self.plan.drawn())
         };
         let decoded_now = next.iter().filter(|entry| !is_kept(entry));
         self.file.decode_shared(codec, decoded_now, &wanted.coefficients)
