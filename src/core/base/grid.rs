@@ -123,7 +123,7 @@ impl Region {
     }
 
     /// The same box moved by `offset`.
-    pub(crate) fn moved_by(&self, offset: [usize; 3]) -> Self {
+    pub fn moved_by(&self, offset: [usize; 3]) -> Self {
         Self {
             start: std::array::from_fn(|a| self.start[a] + offset[a]),
             end: std::array::from_fn(|a| self.end[a] + offset[a]),

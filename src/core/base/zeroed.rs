@@ -23,7 +23,7 @@ impl<T: Pod> Zeroed<T> {
         Self::in_pages(len, true)
     }
 
-    /// The same for a buffer of which little is written: a large one lies in small pages, and those that are not written cost nothing.
+    /// A buffer of `len` zeros of which little will be written. Small pages take memory only where they are written.
     pub fn in_small_pages(len: usize) -> Self {
         Self::in_pages(len, false)
     }
@@ -32,10 +32,7 @@ impl<T: Pod> Zeroed<T> {
         let bytes = len * size_of::<T>();
         let map = if bytes >= LARGE { MmapMut::map_anon(bytes).ok() } else { None };
         let Some(map) = map else { return Self::Heap(vec![T::zeroed(); len]) };
-        // Advice only: a system that does not take it is slower.
-        #[cfg(target_os = "linux")]
-        let _ = map.advise(if are_huge { memmap2::Advice::HugePage } else { memmap2::Advice::NoHugePage });
-        let _ = are_huge; // of no use elsewhere
+        advise(&map, are_huge);
         Self::Map(map, len)
     }
 
@@ -44,6 +41,16 @@ impl<T: Pod> Zeroed<T> {
         bytemuck::cast_slice_mut::<T, u8>(self).fill(byte);
     }
 }
+
+/// Asks for huge or small pages. A system that does not take the advice is slower.
+#[cfg(target_os = "linux")]
+fn advise(map: &MmapMut, are_huge: bool) {
+    use memmap2::Advice;
+    let _ = map.advise(if are_huge { Advice::HugePage } else { Advice::NoHugePage });
+}
+
+#[cfg(not(target_os = "linux"))]
+fn advise(_: &MmapMut, _: bool) {}
 
 impl<T> Default for Zeroed<T> {
     fn default() -> Self {

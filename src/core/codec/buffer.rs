@@ -12,7 +12,7 @@ pub struct Buffer<T: Pooled> {
     /// At least `len` values; the rest has been used before.
     values: Zeroed<T>,
     len: usize,
-    /// Whether the memory goes back to the system instead.
+    /// Whether the memory goes back to the system and not to the pool.
     is_single: bool,
 }
 
@@ -23,7 +23,7 @@ impl<T: Pooled> Buffer<T> {
         Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
     }
 
-    /// The same for a slice of which few entries are used. Fresh memory goes back to the system: it is in small pages.
+    /// Creates a slice of which few entries will be used: a spare one, or fresh memory in small pages, which goes back to the system.
     pub fn for_part(len: usize) -> Self {
         Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
     }

@@ -112,11 +112,11 @@ impl AboveBlocks {
         Ok(field)
     }
 
-    /// A block that stays decoded.
+    /// The nodes of a block if they stay decoded and no thread decodes them now.
     pub(super) fn kept(&self, key: &AboveKey) -> Option<Arc<Field<'static>>> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let (_, slot) = kept.iter().find(|(of, _)| of == key)?;
-        slot.try_lock().ok()?.clone() // another thread may decode it just now
+        slot.try_lock().ok()?.clone()
     }
 
     /// The place of a decoded block, which becomes the most recently used one: the place in the list, else `decoded`, else a new one.
@@ -173,18 +173,22 @@ impl PlaceAbove {
 
     /// Copies the block's nodes out of the decoded block above.
     pub(crate) fn cut(&self, field: &Field<'_>) -> Above {
-        self.cut_part(field, &Region { start: [0; 3], end: self.size })
+        self.cut_part(field, &self.whole())
     }
 
-    /// The same of some of the block's nodes; the others are arbitrary.
+    /// Copies some of the block's nodes; the others are arbitrary.
     pub(super) fn cut_part(&self, field: &Field<'_>, part: &Region) -> Above {
-        Above::new(field, self.outer, &self.above(&Region { start: [0; 3], end: self.size }), part)
+        Above::new(field, self.outer, &self.in_block_above(&self.whole()), part)
     }
 
     /// Some of the block's nodes as nodes of the block above.
-    pub(super) fn above(&self, part: &Region) -> Region {
-        let moved = |of: [usize; 3]| std::array::from_fn(|axis| self.start[axis] + of[axis]);
-        Region { start: moved(part.start), end: moved(part.end) }
+    pub(super) fn in_block_above(&self, part: &Region) -> Region {
+        part.moved_by(self.start)
+    }
+
+    /// All nodes with which the block begins.
+    fn whole(&self) -> Region {
+        Region { start: [0; 3], end: self.size }
     }
 }
 

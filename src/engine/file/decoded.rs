@@ -87,8 +87,8 @@ enum Decoded {
     Samples(Arc<Buffer<u8>>),
 }
 
-/// A cache of decoded blocks. A new block replaces the least recently used ones, but none that the previous run used (frames read ahead make room for the next ones): so a
-/// run over more blocks than fit still finds some of them.
+/// A cache of decoded blocks. A new block replaces the least recently used ones, but none that the previous run used: so a
+/// run over more blocks than fit still finds some of them. Frames that were read ahead make room for the next ones.
 #[derive(Debug)]
 pub(super) struct DecodedBlocks {
     room: usize,
@@ -98,14 +98,15 @@ pub(super) struct DecodedBlocks {
 #[derive(Debug, Default)]
 struct Kept {
     entries: HashMap<DecodedKey, Entry>,
-    /// Blocks of which samples were read, and that were drawn.
+    /// Blocks whose samples were read.
     read: HashSet<(BlockId, u32)>,
+    /// Blocks that pictures used.
     drawn: HashSet<(BlockId, u32)>,
     bytes: usize,
     run: u64,
-    /// What was read last, and by which run.
+    /// The run that read last, and what it read.
     last: Option<(u64, FramesRead)>,
-    /// What a loop reads soon.
+    /// The frames that are read ahead.
     ahead: Option<FramesRead>,
 }
 
@@ -118,20 +119,18 @@ pub(super) struct FramesRead {
 }
 
 impl FramesRead {
-    /// The same region in other frames.
-    fn with_frames(&self, frames: Range<usize>) -> Self {
-        Self { frames, ..self.clone() }
-    }
-
     /// Whether a read of `self` after one of `other` may be a step of a loop.
     fn follows(&self, other: &Self) -> bool {
-        *self == other.with_frames(self.frames.clone()) && self.frames.start == other.frames.end
+        self.is_of_region_of(other) && self.frames.start == other.frames.end
     }
 
     fn is_within(&self, other: &Self) -> bool {
-        *self == other.with_frames(self.frames.clone())
-            && other.frames.start <= self.frames.start
-            && self.frames.end <= other.frames.end
+        let (own, all) = (&self.frames, &other.frames);
+        self.is_of_region_of(other) && all.start <= own.start && own.end <= all.end
+    }
+
+    fn is_of_region_of(&self, other: &Self) -> bool {
+        (self.channel, self.region) == (other.channel, other.region)
     }
 }
 
@@ -181,8 +180,8 @@ impl DecodedBlocks {
         self.kept().read.contains(&(id, lod))
     }
 
-    /// The frames that a read of some of them decodes and keeps together: as many as there is room for, if it goes on with the
-    /// frame after those that an earlier run read last, and not all of the window's frames fit. Each takes `bytes`.
+    /// The frames that a read should decode and keep together, more than it asks for. None unless it begins with the frame after those
+    /// that an earlier run read last, and if the whole window fits. A frame takes `bytes`.
     pub(super) fn ahead(&self, read: &FramesRead, bytes: usize, of_window: &Range<usize>) -> Option<Range<usize>> {
         let (mut kept, bytes) = (self.kept(), bytes.max(1));
         let run = kept.run;
@@ -196,12 +195,12 @@ impl DecodedBlocks {
         }
         kept.forget_frames();
         let most = self.room.saturating_sub(kept.bytes - kept.old_bytes()) / bytes;
-        let ahead = read.with_frames(read.frames.start..of_window.end.min(read.frames.start + most));
         if most <= read.frames.len() {
             return None;
         }
-        kept.ahead = Some(ahead.clone());
-        Some(ahead.frames)
+        let frames = read.frames.start..of_window.end.min(read.frames.start + most);
+        kept.ahead = Some(FramesRead { frames: frames.clone(), ..read.clone() });
+        Some(frames)
     }
 
     /// Whether something of a block is kept. This is no use of it.

@@ -34,7 +34,7 @@ impl CoefficientFile {
         let Some(above) = codec.above() else { return Ok(None) };
         let place = PlaceAbove::new(self.metadata(), codec, &above, entry.id);
         let needed = codec.needed_above(self.all_voxels(entry)?, part);
-        let (key, part) = (above_key(&above, place.id, wanted_above(codec, wanted)), place.above(&needed));
+        let (key, part) = (above_key(&above, place.id, wanted_above(codec, wanted)), place.in_block_above(&needed));
         let field = match self.above.kept(&key) {
             Some(field) => field,
             None => {

@@ -290,7 +290,7 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// Those of some blocks to decode that use whole blocks above: all but those of which a tiny part is decoded alone.
+    /// The blocks that need whole blocks above. Blocks of which a tiny part is decoded alone do not.
     fn sharing<'e>(
         &self,
         codec: &WindowCodec,

@@ -1,6 +1,6 @@
 //! The nodes with which a block below the last tier begins: those of the block above that lie in it (eq 44).
 
-use super::within::Within;
+use super::within::{Within, around};
 use crate::base::grid::Region;
 use crate::codec::real::Real;
 use crate::codec::rows;
@@ -90,11 +90,7 @@ impl Place {
 pub(super) fn needed<'w>(passes: &[Pass], within: impl Iterator<Item = &'w Within>) -> Region {
     let known = passes.iter().zip(within).filter_map(|(pass, within)| Some(Place::new(pass)?.known(within)));
     let known: Vec<[Range<usize>; 2]> = known.collect();
-    let along = |of: usize| {
-        let ranges = known.iter().map(|known| known[of].clone()).filter(|range| !range.is_empty());
-        ranges.reduce(|all, of| all.start.min(of.start)..all.end.max(of.end)).unwrap_or(0..0)
-    };
-    let [y, z] = [along(0), along(1)];
+    let [y, z] = [0, 1].map(|of| around(known.iter().map(|known| known[of].clone())));
     Region { start: [0, y.start, z.start], end: [passes[0].lattice()[0], y.end, z.end] }
 }
 
@@ -103,8 +99,8 @@ impl<'a, R: Real> KnownNodes<'a, R> {
         Self { known, first, passes: passes.iter().map(Place::new).collect() }
     }
 
-    /// Puts the known nodes back into what is computed of a slice that a pass has predicted. Calls `found` with the first place of each row of known
-    /// nodes, their distance and their number.
+    /// Puts the known nodes back into what is computed of a slice that a pass has predicted. Calls `found` with the first place of
+    /// each row of known nodes, their distance and their number.
     pub(super) fn restore(
         &self,
         pass: usize,

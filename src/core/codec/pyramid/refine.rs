@@ -6,6 +6,7 @@
 
 use super::corrections::Correction;
 use super::stencil::{predict_line, taps};
+use super::within::around;
 use crate::codec::real::Real;
 use std::ops::Range;
 use wavesplat_format::Stencil;
@@ -13,7 +14,6 @@ use wavesplat_format::Stencil;
 /// The rows of a lattice along the refined axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Rows {
-    pub(super) outer: usize,
     pub(super) inner: usize,
     pub(super) evens: usize,
     pub(super) odds: usize,
@@ -24,9 +24,7 @@ pub(super) struct Rows {
 impl Rows {
     /// The rows along `axis` of a lattice of `extents` nodes whose axis gains `odds` nodes and keeps some.
     pub(super) fn new(extents: [usize; 3], axis: usize, odds: usize, kept: usize) -> Self {
-        let product = |extents: &[usize]| extents.iter().product();
-        let (inner, outer) = (product(&extents[..axis]), product(&extents[axis + 1..]));
-        Self { outer, inner, evens: extents[axis], odds, kept }
+        Self { inner: extents[..axis].iter().product(), evens: extents[axis], odds, kept }
     }
 
     /// The even rows on which some of the refined rows depend.
@@ -38,8 +36,7 @@ impl Rows {
             let taps = taps(stencil, row / 2, self.evens);
             if row.is_multiple_of(2) { row / 2..row / 2 + 1 } else { taps.first..taps.first + taps.count }
         };
-        let join = |all: Range<usize>, of: Range<usize>| all.start.min(of.start)..all.end.max(of.end);
-        refined.map(needed).reduce(join).unwrap_or(0..0)
+        around(refined.map(needed))
     }
 }
 
@@ -75,15 +72,14 @@ pub(super) fn refine_across<R: Real, C: Correction<R>>(
     correction: &mut C,
 ) {
     let &Rows { inner, evens, odds, kept, .. } = rows;
-    let (apart, of_row) = (1 + usize::from(odds > 0), &reach.inner);
-    let (even_rows, odd_rows) = (reach.rows.start.div_ceil(apart)..reach.rows.end.div_ceil(apart), &reach.rows);
+    let (apart, of_row, computed) = (1 + usize::from(odds > 0), &reach.inner, &reach.rows);
     for part in reach.outer.clone() {
         let from = &coarse[part * evens * inner..][..evens * inner];
         let to = &mut fine[part * (kept + odds) * inner..][..(kept + odds) * inner];
-        for i in even_rows.clone() {
+        for i in computed.start.div_ceil(apart)..computed.end.div_ceil(apart) {
             to[apart * i * inner..][of_row.clone()].copy_from_slice(&from[i * inner..][of_row.clone()]);
         }
-        for i in odd_rows.start / 2..odds.min(odd_rows.end / 2) {
+        for i in computed.start / 2..odds.min(computed.end / 2) {
             let taps = taps(stencil, i, evens);
             let row = |t: usize| {
                 if t < taps.count { &from[(taps.first + t) * inner..][of_row.clone()] } else { &[] }

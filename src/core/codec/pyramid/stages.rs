@@ -21,8 +21,6 @@ pub(super) struct Stages {
     stencil: Stencil,
     lattices: Vec<Lattice>,
     stages: Vec<Stage>,
-    /// Whether all nodes are computed.
-    is_whole: bool,
 }
 
 /// The lattice after a pass, and the pass.
@@ -121,12 +119,11 @@ impl Stages {
                 (_, None) => stages.push(Stage { spatial: n..n + 1, time: None }),
             }
         }
-        Self { stencil, lattices, stages, is_whole: true }
+        Self { stencil, lattices, stages }
     }
 
     /// Computes only what the nodes of a region, along y and z, depend on. The region is not empty.
     pub(super) fn narrow(&mut self, region: &Region) {
-        self.is_whole = false;
         let [mut y, mut z] = [1, 2].map(|axis| region.start[axis]..region.end[axis]);
         for lattice in self.lattices.iter_mut().rev() {
             lattice.within = Within::new(lattice.extents, y.clone(), z.clone());
@@ -263,7 +260,8 @@ impl Stages {
     }
 
     fn buffer<R: Real>(&self, len: usize) -> Buffer<R> {
-        if self.is_whole { Buffer::with_len(len) } else { Buffer::for_part(len) }
+        let is_whole = self.lattices.last().is_none_or(|last| last.within.is_whole(last.extents));
+        if is_whole { Buffer::with_len(len) } else { Buffer::for_part(len) }
     }
 
     /// The slices before a stage that those after it need.

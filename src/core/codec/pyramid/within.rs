@@ -16,4 +16,15 @@ impl Within {
         let places = in_z.start * x * y..in_z.end * x * y;
         Self { y: in_y, z: in_z, places }
     }
+
+    /// Whether it is the whole of a lattice with these nodes.
+    pub(super) fn is_whole(&self, extents: [usize; 3]) -> bool {
+        *self == Self::new(extents, 0..extents[1], 0..extents[2])
+    }
+}
+
+/// The range around all that are not empty.
+pub(super) fn around(ranges: impl Iterator<Item = Range<usize>>) -> Range<usize> {
+    let join = |all: Range<usize>, of: Range<usize>| all.start.min(of.start)..all.end.max(of.end);
+    ranges.filter(|range| !range.is_empty()).reduce(join).unwrap_or(0..0)
 }
