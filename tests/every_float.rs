@@ -69,7 +69,7 @@ fn check(patterns: &Computed<4, impl Sampled<4>>, basis: Basis, window: usize) -
         let of_block = |entry: &BlockEntry| {
             let voxels = EDGE * EDGE * EDGE;
             let all = vec![true; codec.basis.coefficients()];
-            let samples = Block::read(&reader, &codec, entry, [EDGE; 3], &all, None).unwrap().samples(&codec);
+            let samples = Block::read(&reader, &codec, entry, [EDGE; 3], &all, None, None).unwrap().samples(&codec);
             let block = entry.id.block as usize * voxels;
             let frames = samples.chunks_exact(voxels * 4).zip(window.first_frame as usize..);
             let compared =

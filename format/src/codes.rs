@@ -37,7 +37,8 @@ impl Packing {
         cells::estimate_cells(boxes)
     }
 
-    /// Appends the codes of all boxes that are not zero; returns how many they are.
+    /// Appends the codes of all boxes that are not zero; returns how many they are. Codes that are [not needed](CodeBox::needed) may be
+    /// left out, but count.
     ///
     /// # Errors
     /// The reason if `raw` does not follow the format, or a place does not fit in 32 bits.

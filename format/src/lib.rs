@@ -41,7 +41,7 @@ mod writer;
 
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 pub use codes::max_packed;
-pub use codes::sparse::{CodeBox, DenseCodes, SparseCodes};
+pub use codes::sparse::{CodeBox, DenseCodes, Places, SparseCodes};
 pub use description::{
     ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Numbers, Orientation, Values, Variable,
 };

@@ -7,7 +7,7 @@
 //! the arithmetic to the bit.
 
 use crate::bytes::{ParseResult, ensure};
-use crate::codes::sparse::CodeBox;
+use crate::codes::sparse::{CodeBox, Places};
 use crate::limits::MAX_TIERS;
 use bincode::de::Decoder;
 use bincode::enc::Encoder;
@@ -130,7 +130,7 @@ impl PassBox {
     /// `strides` apart along x, y, z.
     pub fn placed(&self, extent: [usize; 4], first: usize, strides: [usize; 3]) -> CodeBox {
         let strides = std::array::from_fn(|axis| strides[axis].saturating_mul(self.every[axis]));
-        CodeBox { extents: self.extents(extent), first, strides, allowed: self.allowed }
+        CodeBox { extents: self.extents(extent), first, strides, allowed: self.allowed, needed: Places::ALL }
     }
 }
 

@@ -225,7 +225,7 @@ impl<S: Storage> Reader<S> {
     }
 
     /// Appends the codes of a level of a pyramid that are not zero, with their places in `boxes`: the nodes that each pass of
-    /// the level adds.
+    /// the level adds. Codes that are [not needed](CodeBox::needed) may be left out.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the window has no such level or the boxes have other extents, [`Error::Lost`] if the block is

@@ -14,12 +14,37 @@ pub struct CodeBox {
     /// The codes of each 2 x 2 x 2 that may be nonzero, as bits from the first to the last, x fastest: another box holds the
     /// others.
     pub allowed: u8,
+    /// The places whose codes are needed: others may be left out, but are checked.
+    pub needed: Places,
+}
+
+/// A range of places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Places {
+    /// The first one.
+    pub start: usize,
+    /// The one after the last.
+    pub end: usize,
+}
+
+impl Places {
+    /// All places.
+    pub const ALL: Self = Self { start: 0, end: usize::MAX };
+
+    /// No places.
+    pub const NONE: Self = Self { start: 0, end: 0 };
 }
 
 impl CodeBox {
     /// A box whose codes lie side by side, x fastest.
     pub fn contiguous(extents: [usize; 4]) -> Self {
-        Self { extents, first: 0, strides: [1, extents[0], extents[0].saturating_mul(extents[1])], allowed: 0xFF }
+        Self {
+            extents,
+            first: 0,
+            strides: [1, extents[0], extents[0].saturating_mul(extents[1])],
+            allowed: 0xFF,
+            needed: Places::ALL,
+        }
     }
 
     /// Whether every place fits in 32 bits.

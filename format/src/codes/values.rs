@@ -9,6 +9,9 @@ pub(super) const LONG: u32 = 128;
 /// Number of value symbols.
 pub(super) const SYMBOLS: u32 = LONG + 4 * (32 - 8) + 4;
 
+/// Codes for which there is room at a time.
+const ROOM: usize = 4 << 10;
+
 /// Bytes after the symbols, so that 8 symbols can be read at each of them.
 pub(super) const BEHIND: usize = 8;
 
@@ -60,7 +63,7 @@ fn unzigzag(value: u32) -> i32 {
 
 /// Turns symbols into codes.
 pub(super) struct Found<'a, 'b> {
-    /// The codes so far, with room for 8 more than there will be: a cell writes 8, and keeps as many as it has.
+    /// The codes so far, with room for more: a cell writes 8, and keeps as many as it has.
     codes: &'a mut SparseCodes,
     count: usize,
     /// The low bits of large values.
@@ -72,10 +75,27 @@ pub(super) struct Found<'a, 'b> {
 impl<'a, 'b> Found<'a, 'b> {
     /// Appends at most `most` codes.
     pub(super) fn new(codes: &'a mut SparseCodes, most: usize, bits: BitReader<'b>) -> Self {
-        let count = codes.values.len();
-        codes.places.resize(count + most + BEHIND, 0);
-        codes.values.resize(count + most + BEHIND, 0);
-        Self { codes, count, bits, invalid: false }
+        codes.places.reserve(most + ROOM);
+        codes.values.reserve(most + ROOM);
+        Self { count: codes.values.len(), codes, bits, invalid: false }
+    }
+
+    /// Makes room for the codes of so many cells. Memory is touched when it is needed.
+    pub(super) fn make_room(&mut self, cells: usize) {
+        let most = self.count + 8 * cells;
+        if most > self.codes.values.len() {
+            self.codes.places.resize(most + ROOM, 0);
+            self.codes.values.resize(most + ROOM, 0);
+        }
+    }
+
+    /// Passes over the codes of a cell.
+    #[inline(always)]
+    pub(super) fn pass_cell(&mut self, byte: u8, symbols: &[u8; 8]) {
+        let symbols = &symbols[..usize::from(super::cells::ONES[usize::from(byte)])];
+        if symbols.iter().any(|symbol| u32::from(*symbol) >= LONG) {
+            Self::lengthen(&mut self.bits, &mut self.invalid, symbols, &mut [0; 8]);
+        }
     }
 
     /// Appends the codes of a cell whose first code has the place `place`. Without long values it uses no loop, because a

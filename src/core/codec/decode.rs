@@ -62,14 +62,15 @@ impl WantedFrames {
 }
 
 impl Block {
-    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, and all exactly stored samples. `above` are
-    /// the nodes of the block above, if the window has tiers.
+    /// Reads a block: the level parts needed for the coefficients that `wanted` marks, of the nodes in `part` if there is one, and all
+    /// exactly stored samples. `above` are the nodes of the block above, if the window has tiers.
     pub fn read<S: Storage>(
         reader: &Reader<S>,
         codec: &WindowCodec,
         entry: &BlockEntry,
         of: [usize; 3],
         wanted: &[bool],
+        part: Option<&Region>,
         above: Option<Above>,
     ) -> Result<Self> {
         let size = codec.decoded_size(of);
@@ -86,7 +87,7 @@ impl Block {
             bytes_read: 0,
         };
         block.thin_samples(codec);
-        block.read_codes(reader, codec, entry, wanted)?;
+        block.read_codes(reader, codec, entry, wanted, part)?;
         block.bytes_read += entry.parts.iter().filter(|p| !is_level(p)).map(|p| u64::from(p.stored_len)).sum::<u64>();
         Ok(block)
     }
@@ -140,6 +141,7 @@ impl Block {
         codec: &WindowCodec,
         entry: &BlockEntry,
         wanted: &[bool],
+        part: Option<&Region>,
     ) -> Result<()> {
         let parts: Vec<&PartEntry> = Self::parts(codec, entry, wanted).filter(|part| is_level(part)).collect();
         if parts.is_empty() {
@@ -150,6 +152,7 @@ impl Block {
         self.codes = match &codec.scheme.pyramid {
             Some(pyramid) => {
                 let passes = codec.passes(pyramid, self.of);
+                let passes = if let Some(part) = part { passes.within(part) } else { passes };
                 Codes::Sparse(passes.read(reader, entry, needed)?)
             }
             None => Codes::Dense(self.read_dense(reader, codec, entry, needed)?),

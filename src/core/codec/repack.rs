@@ -32,7 +32,7 @@ impl Encoder {
         if let Some(pyramid) = &to.scheme.pyramid
             && entry.parts.iter().any(|part| is_packed_anew(part.kind))
         {
-            let block = Block::read(reader, from, entry, size, &vec![true; from.basis.coefficients()], None)?;
+            let block = Block::read(reader, from, entry, size, &vec![true; from.basis.coefficients()], None, None)?;
             parts.extend(self.level_parts(to, pyramid, size, block.step, &block.all_codes(from))?);
         }
         parts.sort_by_key(|part| part.kind);

@@ -342,7 +342,7 @@ impl CoefficientFile {
             return Ok(Block::missing(codec, size));
         }
         let above = if entry.begins_above(codec.tiers()) { self.above(codec, entry.id, wanted)? } else { None };
-        Block::read(&self.reader, codec, entry, size, wanted, above).map_err(|e| self.failed(e))
+        Block::read(&self.reader, codec, entry, size, wanted, None, above).map_err(|e| self.failed(e))
     }
 
     /// All voxels of a block, decoded or not.

@@ -55,7 +55,8 @@ impl CoefficientFile {
     ) -> Result<Block> {
         let begins_above = entry.begins_above(codec.tiers());
         let above = if begins_above { self.above_part(codec, entry, wanted, part)? } else { None };
-        Block::read(&self.reader, codec, entry, self.all_voxels(entry)?, wanted, above).map_err(|e| self.failed(e))
+        let block = Block::read(&self.reader, codec, entry, self.all_voxels(entry)?, wanted, Some(part), above);
+        block.map_err(|e| self.failed(e))
     }
 
     /// Decodes in parallel the blocks above that some blocks share, as many as stay decoded. Otherwise threads would wait for each
@@ -107,7 +108,7 @@ impl CoefficientFile {
         let key = above_key(codec, id, wanted);
         self.above.field(&key, || {
             let (entry, above) = (self.entry_above(id)?, self.above(codec, id, &key.wanted)?);
-            let block = Block::read(&self.reader, codec, &entry, self.all_voxels(&entry)?, &key.wanted, above);
+            let block = Block::read(&self.reader, codec, &entry, self.all_voxels(&entry)?, &key.wanted, None, above);
             Ok(Arc::new(block.map_err(|e| self.failed(e))?.refined(codec, &key.wanted)))
         })
     }

@@ -1,7 +1,7 @@
 //! Tests of lattice codes: documented bytes, round trips, the reference reader and hostile bytes.
 
 use super::super::max_packed;
-use super::super::sparse::{CodeBox, DenseCodes, SparseCodes};
+use super::super::sparse::{CodeBox, DenseCodes, Places, SparseCodes};
 use super::super::volume;
 use super::reference;
 use crate::pyramid::Packing;
@@ -143,20 +143,27 @@ proptest! {
         every in prop::array::uniform3(1usize..4),
         allowed in any::<u8>(),
         seed in any::<u32>(),
+        needed in (0usize..900, 0usize..900),
     ) {
         let [x, y, z, t] = extents;
+        let needed = Places { start: needed.0, end: needed.1 };
         let all = [x * every[0], y * every[1], z * every[2]];
         let slice = all.iter().product::<usize>() + 3;
         let scramble = |i: usize| (i as u32 ^ seed).wrapping_mul(0x9E37_79B1) >> 20;
         let codes: Vec<i32> = (0..slice * t).map(|i| if scramble(i) % 3 == 0 { scramble(i + 1) as i32 % 9 - 4 } else { 0 }).collect();
         let strides = [every[0], all[0] * every[1], all[0] * all[1] * every[2]];
-        let at = CodeBox { extents, first: 2, strides, allowed };
+        let at = CodeBox { extents, first: 2, strides, allowed, needed: Places::ALL };
         let dense = DenseCodes { codes: &codes, slice, at };
         let (mut raw, mut found, mut listed) = (Vec::new(), SparseCodes::default(), SparseCodes::default());
         Packing::Nested.pack(&[dense], &mut raw);
         let count = Packing::Nested.unpack(&raw, &[at], &mut found).expect("packed");
         listed.list(&dense, &at);
         prop_assert_eq!(count, listed.count());
+        let [mut some, mut none] = [needed, Places::NONE].map(|needed| (CodeBox { needed, ..at }, SparseCodes::default()));
+        for (at, found) in [&mut some, &mut none] {
+            prop_assert_eq!(Packing::Nested.unpack(&raw, &[*at], found), Ok(count));
+        }
+        prop_assert_eq!((none.1.count(), none.1.runs()), (0, t));
         for t in 0..t {
             let pairs = |of: &SparseCodes| {
                 let (places, values) = of.run(t);
@@ -174,7 +181,11 @@ proptest! {
             }
             expected.sort_unstable();
             prop_assert_eq!(pairs(&found), expected.clone());
-            prop_assert_eq!(pairs(&listed), expected);
+            prop_assert_eq!(pairs(&listed), expected.clone());
+            let some = pairs(&some.1);
+            prop_assert!(some.iter().all(|pair| expected.contains(pair)));
+            let is_needed = |(place, _): &(u32, i32)| (needed.start..needed.end).contains(&(*place as usize));
+            prop_assert!(expected.iter().filter(|pair| is_needed(pair)).all(|pair| some.contains(pair)));
         }
         let other = CodeBox { allowed: 0, ..at };
         prop_assert_eq!(Packing::Nested.unpack(&raw, &[other], &mut found).is_ok(), count == 0);

@@ -1,14 +1,14 @@
 //! Unpacks streams into codes.
 
 use super::super::sparse::{CodeBox, SparseCodes};
-use super::super::values::{BEHIND, Found, Offsets, offsets};
+use super::super::values::{BEHIND, Found, offsets};
 use super::super::volumes;
 use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, ONES, Row, SCALE_OF, SCALES, cells};
 use crate::bits::{BitReader, take_varint};
 use crate::bytes::{ParseResult, ensure};
 use crate::segments::{Heads, unpack_segments};
 
-/// Appends the codes of all boxes that are not zero; returns how many they are.
+/// Appends the needed codes of all boxes that are not zero; returns how many are not zero.
 ///
 /// # Errors
 /// The reason if `raw` does not follow the format, or a place does not fit in 32 bits.
@@ -95,7 +95,14 @@ impl Streams {
             let marked = self.mark(around, counts, &mut room);
             ensure(inside(marked, row, of), || "a code outside its box is not zero".into())?;
             let start = first + strides[1] * 2 * row.y as u32 + strides[2] * 2 * row.z as u32;
-            self.scatter((start, 2 * strides[0]), &offsets, marked, out);
+            if is_needed(start as usize, of) {
+                out.make_room(marked.len());
+                self.read(marked, |cell, symbols| {
+                    out.add_cell(start.wrapping_add(cell.x.wrapping_mul(2 * strides[0])), &offsets, cell.byte, symbols);
+                });
+            } else {
+                self.read(marked, |cell, symbols| out.pass_cell(cell.byte, symbols));
+            }
         }
         (frame..of.extents[3]).for_each(|_| out.end_run());
         Ok(())
@@ -132,17 +139,17 @@ impl Streams {
         &marked[..found]
     }
 
-    /// Reads the values of the marked cells of a row. The first code of the row's first cell has the place `start`; the
-    /// first codes of neighbouring cells are `apart` places apart.
-    fn scatter(&mut self, (start, apart): (u32, u32), offsets: &Offsets, marked: &[Marked], out: &mut Found<'_, '_>) {
-        for &Marked { x, byte, activity } in marked {
-            let count = ONES[usize::from(byte)];
-            let busy = usize::from(2 * count + activity / 2);
+    /// Calls `add(cell, its next symbols)` for the marked cells of a row.
+    #[inline(always)]
+    fn read(&mut self, marked: &[Marked], mut add: impl FnMut(&Marked, &[u8; 8])) {
+        for cell in marked {
+            let count = ONES[usize::from(cell.byte)];
+            let busy = usize::from(2 * count + cell.activity / 2);
             let scale = usize::from(SCALE_OF[busy % ACTIVITIES]) % SCALES;
             let next = self.scales[scale];
             let ahead = self.symbols.get(next..).and_then(|ahead| ahead.first_chunk::<8>()).unwrap_or(&[0; 8]);
             self.scales[scale] = next.wrapping_add(count.into());
-            out.add_cell(start.wrapping_add(x.wrapping_mul(apart)), offsets, byte, ahead);
+            add(cell, ahead);
         }
     }
 }
@@ -162,6 +169,13 @@ fn zeros_ahead(around: &[u8], symbols: &[u8], next: usize) -> usize {
     let around = around.first_chunk::<8>().unwrap_or(&[1; 8]);
     let any = u64::from_le_bytes(*ahead) | u64::from_le_bytes(*around);
     any.trailing_zeros() as usize / 8
+}
+
+/// Whether some codes of a row of cells may be needed; its first code has the place `start`.
+fn is_needed(start: usize, of: &CodeBox) -> bool {
+    let along = |axis: usize, codes: usize| of.strides[axis].saturating_mul(codes);
+    let last = start.saturating_add(along(0, of.extents[0]).saturating_add(along(1, 1)).saturating_add(along(2, 1)));
+    start < of.needed.end && of.needed.start <= last
 }
 
 /// Whether the cells of a row are zero where codes lie outside of the box or belong to another one.

@@ -2,7 +2,7 @@
 
 use super::stages::{Stages, Step};
 use super::{PlacedBox, PredictionPasses};
-use wavesplat_format::{Axis, CodeBox, Pass, PassBox, Pyramid, SparseCodes};
+use wavesplat_format::{Axis, CodeBox, Pass, PassBox, Places, Pyramid, SparseCodes};
 
 impl<'a> PredictionPasses<'a> {
     /// The passes over every 2^lod-th node along the axes x, y and z, and over all along k, of a block.
@@ -45,7 +45,7 @@ impl<'a> PredictionPasses<'a> {
     fn thinned(&self, whole: &Self, of: &PassBox, lod: u32, finest_level: u32) -> PlacedBox {
         let (pass, part) = (whole.passes[of.pass], of.part);
         let mut at = CodeBox { allowed: of.allowed, ..CodeBox::contiguous(of.extents(whole.extent(of.pass))) };
-        let left_out = PlacedBox { of: None, part, at, every: [1; 3] };
+        let left_out = PlacedBox { of: None, part, at: CodeBox { needed: Places::NONE, ..at }, every: [1; 3] };
         if !has_nodes(&pass, finest_level) {
             return left_out;
         }

@@ -53,8 +53,11 @@ pub(crate) use known::Nodes;
 use refine::gather;
 use stages::{Stages, Step};
 use std::ops::Range;
-use wavesplat_format::{Axis, BlockEntry, CodeBox, DenseCodes, EncodedBlock, PartKind, Pass, PassBox, Pyramid, Reader};
+use wavesplat_format::{
+    Axis, BlockEntry, CodeBox, DenseCodes, EncodedBlock, PartKind, Pass, PassBox, Places, Pyramid, Reader,
+};
 use wavesplat_format::{SparseCodes, Storage};
+use within::Within;
 
 /// The number of level parts of a block.
 pub(crate) const PARTS: usize = Pyramid::PARTS as usize;
@@ -101,9 +104,17 @@ impl<'a> PredictionPasses<'a> {
         new
     }
 
-    /// The same passes; only the nodes of a region, which is not empty, are decoded. Others are arbitrary.
+    /// The same passes; only the nodes of a region, which is not empty, are decoded, from the codes that these need. Others are
+    /// arbitrary.
     pub(crate) fn within(mut self, region: &Region) -> Self {
         self.stages.narrow(region);
+        let within: Vec<&Within> = self.stages.within().collect();
+        for of in self.boxes.iter_mut().filter(|of| of.every == [1; 3]) {
+            if let Some(PassBox { pass, .. }) = of.of {
+                let Range { start, end } = within[pass].places;
+                of.at.needed = Places { start, end };
+            }
+        }
         self
     }
 
