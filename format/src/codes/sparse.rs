@@ -116,6 +116,13 @@ impl SparseCodes {
         size_of_val(&places[..]) + size_of_val(&values[..]) + size_of_val(&ends[..])
     }
 
+    /// Returns unused memory to the system.
+    pub fn shrink(&mut self) {
+        self.places.shrink_to_fit();
+        self.values.shrink_to_fit();
+        self.ends.shrink_to_fit();
+    }
+
     /// Removes all runs and keeps the memory.
     pub fn clear(&mut self) {
         self.places.clear();

@@ -7,9 +7,12 @@ use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 use wavesplat_format::SparseCodes;
 
-/// Codes that return their memory to a pool when dropped, for the next block.
+/// Codes that return their memory to a pool when dropped, for the next block, unless they were kept.
 #[derive(Debug)]
-pub struct PooledCodes(SparseCodes);
+pub struct PooledCodes {
+    codes: SparseCodes,
+    is_kept: bool,
+}
 
 /// The unused codes.
 static SPARE: Mutex<Vec<SparseCodes>> = Mutex::new(Vec::new());
@@ -24,13 +27,21 @@ impl PooledCodes {
         let spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner).pop();
         let mut codes = spare.unwrap_or_default();
         codes.clear();
-        Self(codes)
+        Self { codes, is_kept: false }
+    }
+
+    /// Gives up unused memory, and the pool's claim to the rest.
+    fn keep(&mut self) {
+        self.codes.shrink();
+        self.is_kept = true;
     }
 }
 
 impl Drop for PooledCodes {
     fn drop(&mut self) {
-        SPARE.lock().unwrap_or_else(PoisonError::into_inner).push(std::mem::take(&mut self.0));
+        if !self.is_kept {
+            SPARE.lock().unwrap_or_else(PoisonError::into_inner).push(std::mem::take(&mut self.codes));
+        }
     }
 }
 
@@ -38,13 +49,13 @@ impl Deref for PooledCodes {
     type Target = SparseCodes;
 
     fn deref(&self) -> &SparseCodes {
-        &self.0
+        &self.codes
     }
 }
 
 impl DerefMut for PooledCodes {
     fn deref_mut(&mut self) -> &mut SparseCodes {
-        &mut self.0
+        &mut self.codes
     }
 }
 
@@ -72,6 +83,13 @@ impl Codes {
     /// The codes of a block with a pyramid.
     pub(super) fn sparse(&self) -> &SparseCodes {
         if let Self::Sparse(codes) = self { codes } else { &NO_CODES }
+    }
+
+    /// Prepares codes to be kept for long.
+    pub(super) fn keep(&mut self) {
+        if let Self::Sparse(codes) = self {
+            codes.keep();
+        }
     }
 
     /// Bytes of memory that the codes take.

@@ -268,6 +268,12 @@ impl Block {
         Field::refined(codec, Stored { part: Some(part), ..self.stored() }, wanted)
     }
 
+    /// The block in no more memory than it needs.
+    pub fn to_keep(mut self) -> Self {
+        self.codes.keep();
+        self
+    }
+
     /// Bytes of memory that the block takes.
     pub fn held_bytes(&self) -> usize {
         let overrides = self.missing.0.len() + self.missing.1.len() + self.outliers.samples.len();

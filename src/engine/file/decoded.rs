@@ -1,4 +1,4 @@
-//! Blocks of an open file that stay decoded for the next pictures and reads, up to a number of bytes.
+//! Blocks of an open file that stay unpacked or decoded for the next pictures and reads, up to a number of bytes.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -13,7 +13,7 @@ use wavesplat_format::{BlockEntry, BlockId, PartKind};
 /// A block, and its coefficients if they have to be decoded together.
 #[derive(Debug)]
 pub(crate) struct DecodedBlock {
-    pub(crate) block: Block,
+    pub(crate) block: Arc<Block>,
     pub(crate) field: Option<Field<'static>>,
 }
 
@@ -53,8 +53,8 @@ pub(super) struct DecodedKey {
 /// The form in which a block is decoded.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum DecodedForm {
-    /// The coefficients that are marked.
-    Coefficients { wanted: Vec<bool>, of: PartsRead },
+    /// The codes of the coefficients that are marked.
+    Codes { wanted: Vec<bool>, of: PartsRead },
     /// Values in some frames, made by one of two sums.
     Values { frames: Vec<usize>, by_coefficients: bool, of: PartsRead },
     /// All coefficients of the window.
@@ -82,6 +82,7 @@ impl PartsRead {
 
 #[derive(Debug, Clone)]
 enum Decoded {
+    Unpacked(Arc<Block>),
     Block(Arc<DecodedBlock>),
     Values(Arc<BlockValues>),
     Samples(Arc<Buffer<u8>>),
@@ -208,6 +209,14 @@ impl DecodedBlocks {
         self.kept().entries.contains_key(key)
     }
 
+    /// A block that is unpacked, if it is kept.
+    pub(super) fn unpacked(&self, key: &DecodedKey) -> Option<Arc<Block>> {
+        match self.kept().get(key)? {
+            Decoded::Unpacked(block) => Some(block),
+            _ => None,
+        }
+    }
+
     /// The coefficients of a block, if they are kept.
     pub(super) fn block(&self, key: &DecodedKey) -> Option<Arc<DecodedBlock>> {
         match self.kept().get(key)? {
@@ -243,7 +252,12 @@ impl DecodedBlocks {
         kept.bytes - kept.old_bytes() + bytes <= self.room
     }
 
-    /// Keeps a block if there is room.
+    /// Keeps an unpacked block if there is room.
+    pub(super) fn keep_unpacked(&self, key: DecodedKey, block: &Arc<Block>) {
+        self.kept().put(key, Decoded::Unpacked(block.clone()), block.held_bytes(), self.room);
+    }
+
+    /// Keeps the coefficients of a block if there is room.
     pub(super) fn keep_block(&self, key: DecodedKey, block: &Arc<DecodedBlock>) {
         self.kept().put(key, Decoded::Block(block.clone()), block.bytes(), self.room);
     }

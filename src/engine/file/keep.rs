@@ -8,7 +8,7 @@ use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
-use wavesplat_core::codec::decode::WantedFrames;
+use wavesplat_core::codec::decode::{Block, WantedFrames};
 use wavesplat_core::codec::part::{decoded_together, is_divisible};
 use wavesplat_format::BlockEntry;
 
@@ -58,30 +58,36 @@ impl CoefficientFile {
         }
     }
 
-    /// As [`Self::block`], with the coefficients if they have to be decoded together. Uses what was decoded, and keeps it if `keeps`.
+    /// A block with the coefficients that are marked, if they have to be decoded together and `has_field` asks for them. Uses codes that
+    /// were unpacked, and keeps them if `keeps`.
     pub(crate) fn decoded(
         &self,
         codec: &WindowCodec,
         entry: &BlockEntry,
         wanted: &[bool],
-        is_field_needed: bool,
+        has_field: bool,
         keeps: bool,
-    ) -> Result<Arc<DecodedBlock>> {
-        let decode = || {
-            let block = self.block(codec, entry, wanted)?;
-            let has_field = is_field_needed && block.exact.is_none();
-            let field = if has_field { block.field_at_once(codec, wanted) } else { None };
-            Ok(Arc::new(DecodedBlock { block, field }))
-        };
-        let Some(kept) = self.kept.as_ref().filter(|_| is_field_needed) else { return decode() };
-        let key = self.key_of_coefficients(codec, entry, wanted);
-        if let Some(block) = kept.block(&key) {
+    ) -> Result<DecodedBlock> {
+        let block = self.unpacked(codec, entry, wanted, keeps)?;
+        let has_field = has_field && block.exact.is_none();
+        let field = if has_field { block.field_at_once(codec, wanted) } else { None };
+        Ok(DecodedBlock { block, field })
+    }
+
+    /// As [`Self::block`]. Uses what was unpacked, and keeps it if `keeps`: the codes take less memory than coefficients and most of
+    /// the time.
+    fn unpacked(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool], keeps: bool) -> Result<Arc<Block>> {
+        let unpack = || self.block(codec, entry, wanted);
+        let Some(kept) = &self.kept else { return unpack().map(Arc::new) };
+        let key = self.key_of_codes(codec, entry, wanted);
+        if let Some(block) = kept.unpacked(&key) {
             return Ok(block);
         }
-        let block = decode()?;
-        if keeps {
-            kept.keep_block(key, &block);
+        if !keeps {
+            return unpack().map(Arc::new);
         }
+        let block = Arc::new(unpack()?.to_keep());
+        kept.keep_unpacked(key, &block);
         Ok(block)
     }
 
@@ -93,11 +99,9 @@ impl CoefficientFile {
         fits(values) && (FEW_VALUES * values <= coefficients || !fits(coefficients))
     }
 
-    /// Whether pictures should keep the coefficients of so many blocks after all: they fit, and other frames of this one were drawn
-    /// before.
-    pub(crate) fn keeps_coefficients_too(&self, entry: &BlockEntry, blocks: usize) -> bool {
-        let Some(kept) = &self.kept else { return false };
-        kept.is_drawn_again(entry.id, self.lod) && kept.fits(self.bytes_of_coefficients() * self.voxels_of(blocks))
+    /// Whether pictures should keep the codes of a block after all: other frames of it were drawn before.
+    pub(crate) fn keeps_codes_too(&self, entry: &BlockEntry) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.is_drawn_again(entry.id, self.lod))
     }
 
     /// Bytes of the coefficients of a voxel.
@@ -264,7 +268,7 @@ impl CoefficientFile {
         }
         let block = self.block(codec, entry, &all)?;
         let (field, bytes_read) = (Some(block.refined(codec, &all)), block.bytes_read);
-        let decoded = Arc::new(DecodedBlock { block, field });
+        let decoded = Arc::new(DecodedBlock { block: Arc::new(block), field });
         kept.keep_block(key, &decoded);
         Ok(Some((decoded, bytes_read)))
     }
@@ -282,7 +286,7 @@ impl CoefficientFile {
         let block =
             if is_alone { self.block_part(codec, entry, wanted, part) } else { self.block(codec, entry, wanted) }?;
         let (field, bytes_read) = (Some(block.refined_in(codec, wanted, part)), block.bytes_read);
-        Ok((Arc::new(DecodedBlock { block, field }), bytes_read))
+        Ok((Arc::new(DecodedBlock { block: Arc::new(block), field }), bytes_read))
     }
 
     /// The voxels of a block that are decoded at the level of detail.
@@ -300,9 +304,9 @@ impl CoefficientFile {
         self.kept.as_ref().is_some_and(|kept| kept.has(&self.key(entry, form)))
     }
 
-    /// Whether the coefficients of a block are kept.
-    pub(crate) fn keeps_coefficients(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> bool {
-        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key_of_coefficients(codec, entry, wanted)))
+    /// Whether the codes of a block are kept.
+    pub(crate) fn keeps_codes(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> bool {
+        self.kept.as_ref().is_some_and(|kept| kept.has(&self.key_of_codes(codec, entry, wanted)))
     }
 
     /// Whether the values of a block are kept.
@@ -316,9 +320,9 @@ impl CoefficientFile {
         self.key(entry, DecodedForm::Values { frames, by_coefficients, of })
     }
 
-    fn key_of_coefficients(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> DecodedKey {
+    fn key_of_codes(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> DecodedKey {
         let (wanted, of) = (wanted.to_vec(), PartsRead::new(codec, entry));
-        self.key(entry, DecodedForm::Coefficients { wanted, of })
+        self.key(entry, DecodedForm::Codes { wanted, of })
     }
 
     fn key(&self, entry: &BlockEntry, form: DecodedForm) -> DecodedKey {

@@ -13,7 +13,7 @@ use wavesplat_core::codec::field::Field;
 /// A decoded block of a file.
 pub(super) struct CodedBlock<'a> {
     plan: &'a BatchPlan,
-    decoded: Arc<DecodedBlock>,
+    decoded: DecodedBlock,
     /// The error of its samples, for each error plane.
     errors: Vec<f64>,
     dense: Dense,
@@ -31,8 +31,8 @@ enum Dense {
 
 impl<'a> CodedBlock<'a> {
     /// A block with the errors of its samples, one for each error plane.
-    pub(super) fn new(plan: &'a BatchPlan, decoded: Arc<DecodedBlock>, errors: Vec<f64>) -> Self {
-        let DecodedBlock { block, field } = decoded.as_ref();
+    pub(super) fn new(plan: &'a BatchPlan, decoded: DecodedBlock, errors: Vec<f64>) -> Self {
+        let DecodedBlock { block, field } = &decoded;
         if block.exact.is_some() || plan.what == SplatSource::Samples {
             let dense = Dense::Samples(block.samples_of(&plan.codec, &plan.wanted));
             return Self { plan, decoded, errors, dense, few: Vec::new() };
@@ -80,7 +80,7 @@ impl BlockPlanes for CodedBlock<'_> {
 
     fn plane<'a>(&'a self, plane: usize, scratch: &'a mut Scratch) -> Result<PlaneValues<'a>> {
         let Self { plan, decoded, errors, dense, few } = self;
-        let DecodedBlock { block, field } = decoded.as_ref();
+        let DecodedBlock { block, field } = decoded;
         if let Some(error) = plane.checked_sub(plan.layout.first_error()) {
             return Ok(self.plane_of_errors(errors[error], scratch));
         }

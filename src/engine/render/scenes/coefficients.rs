@@ -332,8 +332,8 @@ impl<'a> CoefficientBatch<'a> {
         Ok(())
     }
 
-    /// Decodes a block. The file keeps it if `keeps`.
-    fn decoded(&self, entry: &BlockEntry, keeps: bool) -> Result<Arc<DecodedBlock>> {
+    /// Decodes a block. The file keeps its codes if `keeps`.
+    fn decoded(&self, entry: &BlockEntry, keeps: bool) -> Result<DecodedBlock> {
         let BatchPlan { codec, wanted, what, .. } = &self.plan;
         self.file.decoded(codec, entry, &wanted.coefficients, *what == SplatSource::Coefficients, keeps)
     }
@@ -342,11 +342,11 @@ impl<'a> CoefficientBatch<'a> {
     fn values(&self, entry: &BlockEntry) -> Result<Arc<BlockValues>> {
         let (plan, blocks) = (&self.plan, self.selection.blocks.len());
         if !self.file.keeps_values(blocks, plan.wanted.frames.len()) {
-            return Ok(Arc::new(values_of(plan, &*self.decoded(entry, true)?)));
+            return Ok(Arc::new(values_of(plan, &self.decoded(entry, true)?)));
         }
         self.file.values(&plan.codec, entry, plan.drawn(), || {
-            let keeps = self.file.keeps_coefficients_too(entry, blocks);
-            Ok(values_of(plan, &*self.decoded(entry, keeps)?))
+            let keeps = self.file.keeps_codes_too(entry);
+            Ok(values_of(plan, &self.decoded(entry, keeps)?))
         })
     }
 }
@@ -371,7 +371,7 @@ impl FrameBatch for CoefficientBatch<'_> {
         }
         let next = blocks.iter().map(|block| Ok(self.kept(*block)?.entry)).collect::<Result<Vec<_>>>()?;
         let is_kept = |entry: &BlockEntry| {
-            self.file.keeps_coefficients(codec, entry, &wanted.coefficients)
+            self.file.keeps_codes(codec, entry, &wanted.coefficients)
                 || self.plan.by_values && self.file.keeps_values_of(codec, entry, self.plan.drawn())
         };
         let decoded_now = next.iter().filter(|entry| !is_kept(entry));
