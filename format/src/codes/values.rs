@@ -56,6 +56,20 @@ pub(super) fn symbol(code: i32, bits: &mut BitWriter) -> u8 {
     (LONG + 4 * (low - 5) + (value >> low & 3)) as u8
 }
 
+/// The nonzero codes of a cell, in order, and then copies of the last; `significant` marks them.
+#[inline(always)]
+pub(super) fn in_order(codes: [i32; 8], significant: u8) -> [i32; 8] {
+    PLACES[usize::from(significant)].map(|place| codes[usize::from(place) % 8])
+}
+
+/// The symbols of nonzero codes, if none has low bits.
+#[inline(always)]
+pub(super) fn short_symbols(codes: &[i32; 8]) -> Option<[u8; 8]> {
+    let values = codes.map(|code| (((code << 1) ^ (code >> 31)) as u32).wrapping_sub(1));
+    let are_short = values.iter().fold(0, |any, value| any | value) < LONG;
+    are_short.then(|| values.map(|value| value as u8))
+}
+
 /// Maps 1, 2, 3, ... to -1, 1, -2, ...
 fn unzigzag(value: u32) -> i32 {
     (value >> 1) as i32 ^ ((value & 1) as i32).wrapping_neg()

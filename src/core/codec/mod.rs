@@ -15,6 +15,7 @@ pub mod encode;
 mod error_weights;
 pub mod field;
 mod listed;
+mod forward;
 mod gain;
 mod load;
 pub mod part;

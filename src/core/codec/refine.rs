@@ -6,16 +6,17 @@
 
 use super::buffer::{Buffer, clear};
 use super::check::{Compared, Tally};
-use super::codes::PooledCodes;
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
+use super::forward::forward;
 use super::load::{Missing, load_group};
 use super::pyramid::{Nodes, PredictionPasses};
 use super::real::Real;
-use super::rows::Change;
+use super::rows::count_nonzero;
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
+use crate::base::vectors::dispatch;
 use crate::codec::bound::Measure;
 use crate::wavelet::LANES;
 use wavesplat_format::{Basis, Outliers, PartStats, Pyramid};
@@ -32,9 +33,8 @@ pub(super) struct Coded {
     pub(super) tally: Tally,
 }
 
-/// The codes of a block that are not zero, and how the field that they give compares with the source.
+/// How the field that codes give compares with the source.
 struct Checked {
-    listed: PooledCodes,
     /// Whether each k of the field may have nodes that are not zero.
     marked: Vec<bool>,
     /// None if too many samples miss the bound.
@@ -42,18 +42,23 @@ struct Checked {
 }
 
 impl Checked {
-    /// An estimate of the bytes, in those of a code.
-    fn cost(&self) -> usize {
+    /// An estimate of the bytes of `codes` and outliers, in those of a code.
+    fn cost(&self, codes: &[i32]) -> usize {
         let outliers = self.tally.as_ref().map_or(usize::MAX, |tally| tally.outliers.len());
-        self.listed.count().saturating_add(outliers.saturating_mul(CODES_PER_OUTLIER))
+        count(codes).saturating_add(outliers.saturating_mul(CODES_PER_OUTLIER))
     }
 
-    /// Whether outliers take a large share of the bytes, and are more than a few of the block's samples.
-    fn has_many_outliers(&self, samples: usize) -> bool {
+    /// Whether outliers are more than a few of the block's samples, and take a large share of the bytes beside `codes`.
+    fn has_many_outliers(&self, samples: usize, codes: &[i32]) -> bool {
         let is_large =
-            |outliers: usize| outliers * CODES_PER_OUTLIER > self.listed.count() && outliers > samples / FEW_OUTLIERS;
+            |outliers: usize| outliers > samples / FEW_OUTLIERS && outliers * CODES_PER_OUTLIER > count(codes);
         self.tally.as_ref().is_none_or(|tally| is_large(tally.outliers.len()))
     }
+}
+
+/// The number of codes that are not zero.
+fn count(codes: &[i32]) -> usize {
+    dispatch!(count_nonzero(codes))
 }
 
 /// The samples of a block, and the codec for them.
@@ -103,10 +108,10 @@ impl Source<'_> {
         let check = |field: &[R], codes: &[i32]| self.checked(&weighing, &passes, known, field, codes);
         let mut checked = check(field, codes);
         let finest = step / self.codec.scheme.coarseness.max(1.0);
-        while checked.has_many_outliers(self.missing.all) && step > finest {
-            let finer = (step / FINER).max(finest);
+        while checked.has_many_outliers(self.missing.all, codes) && step > finest {
+            let (finer, cost) = ((step / FINER).max(finest), checked.cost(codes));
             let found = encode(finer, field, codes).map(|()| check(field, codes));
-            let is_worse = |found: &Checked| found.tally.is_some() && checked.cost() <= found.cost();
+            let is_worse = |found: &Checked| found.tally.is_some() && cost <= found.cost(codes);
             match found {
                 Some(found) if !is_worse(&found) => (step, checked) = (finer, found),
                 _ => {
@@ -115,13 +120,14 @@ impl Source<'_> {
                 }
             }
         }
-        let Checked { listed, marked, tally } = checked;
+        let Checked { marked, tally } = checked;
         let mut tally = tally?;
         let outliers = tally.take_outliers(self.codec, self.samples);
+        let (listed, counts) = passes.list_coarse(codes);
         // The directory lists no other parts.
-        let changes = passes.changes(&passes.coded(&listed), step, &listed, known, passes.field(field, &marked));
-        let of_part = |(part, change): (u8, &Change)| change.stats(passes.count(part, &listed));
-        let parts = Some((0..).zip(&changes).map(of_part).collect());
+        let coded = counts.map(|count| count > 0);
+        let changes = passes.changes(&coded, step, &listed, known, passes.field(field, &marked));
+        let parts = Some(changes.iter().zip(counts).map(|(change, count)| change.stats(count)).collect());
         Some(Coded { step, marked, parts, dropped: tally.squared_error, outliers, tally })
     }
 
@@ -155,14 +161,13 @@ impl Source<'_> {
         field: &[R],
         codes: &[i32],
     ) -> Checked {
-        let listed = passes.list(codes);
-        let marked = passes.marked(&listed, known);
+        let marked = passes.marked_codes(codes, known);
         let tally = match self.plain() {
             _ if self.codec.tier > 0 => Some(Tally::new()), // its samples are stored with the blocks below
             true => self.check_samples(field),
             false => self.check_series(weighing, field, &marked),
         };
-        Checked { listed, marked, tally }
+        Checked { marked, tally }
     }
 
     /// The step of the finest level. None if the block must be stored exactly.
@@ -180,10 +185,10 @@ impl Source<'_> {
     /// Loads the nodes that the pyramid refines.
     pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup) -> Buffer<R> {
         let mut field = Buffer::with_len(self.codec.basis.coefficients() * self.voxels());
-        if self.plain() {
-            self.load_samples(&mut field);
-        } else {
-            self.load_series(weighing, &mut field);
+        match self.codec.basis.rows().filter(|_| self.missing.count == 0) {
+            _ if self.plain() => self.load_samples(&mut field),
+            Some(rows) => forward(rows, self.codec.sample, self.samples, &mut field),
+            None => self.load_series(weighing, &mut field),
         }
         field
     }

@@ -65,7 +65,7 @@ impl<'a, R: Real> Trial<'a, R> {
         if !passes.encode(step, nodes, None, &mut field, &mut codes) {
             return None;
         }
-        let outliers = source.estimate_outliers(weighing, &field, &passes.marked_codes(&codes));
+        let outliers = source.estimate_outliers(weighing, &field, &passes.marked_codes::<R>(&codes, None));
         let packed = |part| pyramid.packing.estimate(&passes.part_of(part, &codes));
         let packed: usize = (0..Pyramid::PARTS).map(packed).sum();
         // With too many outliers, all is stored exactly; the count still shows how near a better step is.

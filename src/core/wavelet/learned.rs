@@ -88,6 +88,10 @@ impl TimeBasis for Learned {
         dispatch!(sums_of_products(&self.rows[..], series, coefficients));
     }
 
+    fn rows(&self) -> Option<&[Vec<f64>]> {
+        Some(&self.rows)
+    }
+
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]) {
         dispatch!(sums_of_products(&self.columns[..], &*coefficients, series));
     }

@@ -69,6 +69,11 @@ pub trait TimeBasis: Send + Sync + Debug {
     /// Transforms samples to coefficients. `series` holds [`Self::frames`] lanes, `coefficients` K lanes.
     fn forward(&self, series: &[Lane], coefficients: &mut [Lane]);
 
+    /// The functions u_k(t_j), as `[k][j]`, if coefficients are sums of products with them.
+    fn rows(&self) -> Option<&[Vec<f64>]> {
+        None
+    }
+
     /// Transforms coefficients to samples. Overwrites `coefficients`, which serve as scratch.
     fn inverse(&self, coefficients: &mut [Lane], series: &mut [Lane]);
 

@@ -244,8 +244,9 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let needs = |Room { batch, kept_above }: &Room| {
         batch * 4 * raw + threads(*batch) * scratch + kept_above * above + spool + choice + memory::FIXED
     };
-    // recent memory is cached
-    let enough = (4 * rayon::current_num_threads() - 2).min(memory::MOST_BLOCKS);
+    // Several blocks a thread keep all threads busy. One thread is faster with one: fresh memory costs more than it waits.
+    let workers = rayon::current_num_threads();
+    let enough = if workers == 1 { 1 } else { (4 * workers - 2).min(memory::MOST_BLOCKS) };
     let fits = |room: &Room| needs(room) + archive.memory <= config.memory;
     let largest = |kept_above| (1..=enough).rev().map(|batch| Room { batch, kept_above }).find(fits);
     // More threads save more than blocks that stay decoded.

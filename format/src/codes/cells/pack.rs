@@ -1,7 +1,7 @@
 //! Packs codes into streams.
 
 use super::super::sparse::DenseCodes;
-use super::super::values::symbol;
+use super::super::values::{in_order, short_symbols, symbol};
 use super::{ACTIVITIES, CLASS_OF, CLASSES, Grid, ONES, Row, SCALE_OF, SCALES, cells};
 use crate::bits::{BitWriter, put_varint};
 use crate::segments::{Heads, estimate_segments, pack_segments};
@@ -88,23 +88,24 @@ impl<'a> Streams<'a> {
             for (j, (&byte, &around)) in bytes.iter().zip(around).enumerate() {
                 self.significance[usize::from(CLASS_OF[usize::from(around) % ACTIVITIES])].push(byte);
                 if byte != 0 {
-                    self.add_cell(lines, 8 * i + j, byte, around);
+                    self.add_cell(codes_of(lines, 2 * (8 * i + j)), byte, around);
                 }
             }
         }
     }
 
-    /// Adds the values of a cell.
-    fn add_cell(&mut self, lines: [&[i32]; 4], cell: usize, significant: u8, activity: u8) {
-        let busy = usize::from(2 * ONES[usize::from(significant)] + activity / 2);
+    /// Adds the values of a cell. Without long values it uses no loop over them, because a processor could not predict its end.
+    fn add_cell(&mut self, codes: [i32; 8], significant: u8, activity: u8) {
+        let count = ONES[usize::from(significant)];
+        let busy = usize::from(2 * count + activity / 2);
         let values = &mut self.values[usize::from(SCALE_OF[busy % ACTIVITIES])];
-        let mut left = significant;
-        while left != 0 {
-            let bit = left.trailing_zeros() as usize;
-            let code = lines[bit / 2][2 * cell + bit % 2];
-            values.push(symbol(code, &mut self.bits));
-            left &= left - 1;
+        let in_order = in_order(codes, significant);
+        let end = values.len() + usize::from(count);
+        match short_symbols(&in_order) {
+            Some(symbols) => values.extend_from_slice(&symbols),
+            None => values.extend(in_order[..count.into()].iter().map(|code| symbol(*code, &mut self.bits))),
         }
+        values.truncate(end);
     }
 }
 
@@ -113,6 +114,16 @@ fn lines<'a>(codes: &'a [i32], extents: &[usize; 4], row: Row, outside: &'a [i32
     let ([sx, sy, ..], [y, z]) = (*extents, row.whole);
     let line = |there: bool, skip: usize| if there { &codes[row.code + skip..][..sx] } else { outside };
     [line(true, 0), line(y, sx), line(z, sx * sy), line(y && z, sx * sy + sx)]
+}
+
+/// The codes of the cell whose first codes are the `x`-th of the lines; 0 outside of the box.
+#[inline(always)]
+fn codes_of(lines: [&[i32]; 4], x: usize) -> [i32; 8] {
+    let pairs = lines.map(|line| match line.get(x..x + 2) {
+        Some(pair) => [pair[0], pair[1]],
+        None => [line[x], 0],
+    });
+    [pairs[0][0], pairs[0][1], pairs[1][0], pairs[1][1], pairs[2][0], pairs[2][1], pairs[3][0], pairs[3][1]]
 }
 
 /// Computes the significance bytes of a row, in groups of 8.

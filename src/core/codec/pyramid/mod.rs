@@ -43,7 +43,7 @@ mod tier_tests;
 use super::buffer::Buffer;
 use super::codes::PooledCodes;
 use super::real::Real;
-use super::rows::{self, Change, add_changes, add_changes_to_zero};
+use super::rows::{self, Change, add_changes, add_changes_to_zero, count_nonzero};
 use crate::base::grid::Region;
 use crate::base::vectors::dispatch;
 use crate::wavelet;
@@ -169,10 +169,29 @@ impl<'a> PredictionPasses<'a> {
 
     /// Lists the codes that are not zero, from all codes, pass after pass.
     pub(crate) fn list(&self, codes: &[i32]) -> PooledCodes {
+        self.list_parts(codes, Pyramid::PARTS)
+    }
+
+    /// Lists the codes on which the [changes](Self::changes) of level parts depend: those of all parts but the finest, which has most.
+    /// Returns the number of codes of each part, too.
+    pub(crate) fn list_coarse(&self, codes: &[i32]) -> (PooledCodes, [usize; PARTS]) {
+        let finest = self.boxes.iter().map(|of| of.part).max().unwrap_or(0);
+        let listed = self.list_parts(codes, finest);
+        let mut counts = std::array::from_fn(|part| self.count(part as u8, &listed));
+        counts[usize::from(finest)] = dispatch!(count_nonzero(codes)) - listed.count();
+        (listed, counts)
+    }
+
+    /// As [`Self::list`], without the codes of parts from `end` on.
+    fn list_parts(&self, codes: &[i32], end: u8) -> PooledCodes {
         let mut listed = PooledCodes::new();
         for part in 0..Pyramid::PARTS {
             let places = self.placed_boxes(part);
-            self.part_of(part, codes).iter().zip(&places).for_each(|(of, places)| listed.list(of, places));
+            if part < end {
+                self.part_of(part, codes).iter().zip(&places).for_each(|(of, places)| listed.list(of, places));
+            } else {
+                listed.skip(&places);
+            }
         }
         listed
     }
@@ -289,9 +308,10 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// As [`Self::marked`], from all codes, pass after pass.
-    pub(crate) fn marked_codes(&self, codes: &[i32]) -> Vec<bool> {
-        let some =
-            (0..self.pyramids).map(|k| self.code_ranges(k).into_iter().any(|range| !rows::all_zero(&codes[range])));
+    pub(crate) fn marked_codes<R: Real>(&self, codes: &[i32], known: Option<Nodes<'_, R>>) -> Vec<bool> {
+        let has_codes = |number| self.code_ranges(number).into_iter().any(|range| !rows::all_zero(&codes[range]));
+        let has_known = |number| known.is_some_and(|known| !known.is_zero(self.ks(number)));
+        let some = (0..self.pyramids).map(|number| has_codes(number) || has_known(number));
         some.flat_map(|some| std::iter::repeat_n(some, self.shape[3])).collect()
     }
 
