@@ -2,7 +2,7 @@
 
 use super::WindowCodec;
 use super::buffer::Buffer;
-use crate::base::sample;
+use crate::base::sample::{self, SampleType};
 use std::ops::Deref;
 
 /// A block, and the voxels whose samples are known.
@@ -39,14 +39,6 @@ impl From<[usize; 3]> for BlockWithGhosts {
 }
 
 impl BlockWithGhosts {
-    /// The samples of the block alone, frame by frame.
-    pub(super) fn own<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> MaybeCopied<'a> {
-        match self.known == self.size {
-            true => MaybeCopied::Lent(samples),
-            false => MaybeCopied::Copied(copied(codec, samples, self.size, self.known, self.size)),
-        }
-    }
-
     /// The samples of `outer` voxels along x, y, z, at least as many as are known. Beyond the known voxels, the last
     /// two planes are extrapolated linearly.
     pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> MaybeCopied<'a> {
@@ -54,7 +46,7 @@ impl BlockWithGhosts {
             return MaybeCopied::Lent(samples);
         }
         let mut known = self.known;
-        let mut extended = copied(codec, samples, known, known, outer);
+        let mut extended = copied(codec.sample, samples, known, known, outer);
         for axis in 0..3 {
             if known[axis] < outer[axis] {
                 extrapolate(codec, &mut extended, outer, known, axis, known[axis]);
@@ -78,16 +70,17 @@ impl BlockWithGhosts {
                 known[axis] -= 1;
             }
         }
-        MaybeCopied::Copied(copied(codec, &nodes, self.size, self.known, self.size))
+        MaybeCopied::Copied(copied(codec.sample, &nodes, self.size, self.known, self.size))
     }
 }
 
 /// The samples of `size` voxels, frame by frame, from an array of `from` voxels in one of `to` voxels. The others are arbitrary.
-fn copied(codec: &WindowCodec, samples: &[u8], size: [usize; 3], from: [usize; 3], to: [usize; 3]) -> Buffer<u8> {
-    let each = codec.sample.size();
+pub(super) fn copied(ty: SampleType, samples: &[u8], size: [usize; 3], from: [usize; 3], to: [usize; 3]) -> Buffer<u8> {
+    let each = ty.size();
+    let frames = samples.len() / (each * from.iter().product::<usize>());
     let row = |of: [usize; 3], t: usize, z: usize, y: usize| each * of[0] * (y + of[1] * (z + of[2] * t));
-    let mut out = Buffer::with_len(codec.frames() * to.iter().product::<usize>() * each);
-    for (t, z, y) in rows(codec.frames(), [size[1], size[2]]) {
+    let mut out = Buffer::with_len(frames * to.iter().product::<usize>() * each);
+    for (t, z, y) in rows(frames, [size[1], size[2]]) {
         let samples = &samples[row(from, t, z, y)..][..size[0] * each];
         out[row(to, t, z, y)..][..samples.len()].copy_from_slice(samples);
     }

@@ -1,6 +1,8 @@
 //! Compares decoded samples with the source: errors, range, and the samples that miss the bound.
 
 use super::WindowCodec;
+use super::box_samples::BoxSamples;
+use super::buffer::clear;
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
 use crate::codec::bound::Bound;
@@ -27,12 +29,17 @@ pub(super) struct Tally {
     pub(super) share: f64,
     /// The indices of samples that must be stored exactly.
     pub(super) outliers: Vec<u32>,
+    /// The present samples of one series: frame and index.
+    present: Vec<(usize, usize)>,
+    /// Their errors, and those allowed.
+    errors: Vec<(f64, f64)>,
 }
 
 impl Tally {
     pub(super) fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers: Vec::new() }
+        let (outliers, present, errors) = Default::default();
+        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers, present, errors }
     }
 
     pub(super) fn add(&mut self, decoded: f64, error: f64) {
@@ -89,30 +96,29 @@ impl Tally {
             let rounded = sample::round_to(codec.sample, decoded);
             (codec.error(decoded, rounded, source), codec.bound.allowed(source))
         };
-        let present = (0..compared.source.len()).filter_map(|t| Some((t, index(t)?)));
-        let present: Vec<(usize, usize)> = present.collect(); // (frame, index)
-        let mut errors: Vec<(f64, f64)> = present.iter().map(|(t, _)| error(*t)).collect(); // (error, allowed)
+        let (mut present, mut errors) = (std::mem::take(&mut self.present), std::mem::take(&mut self.errors));
+        clear(&mut present).extend((0..compared.source.len()).filter_map(|t| Some((t, index(t)?))));
+        clear(&mut errors).extend(present.iter().map(|(t, _)| error(*t)));
         let holds = codec.bound.holds(errors.iter().copied());
-        for ((t, index), (error, allowed)) in present.into_iter().zip(&mut errors) {
+        for ((t, index), (error, allowed)) in present.iter().zip(&mut errors) {
             if holds || *error <= *allowed {
-                self.add(sample::round_to(codec.sample, compared.decoded[t][lane]), *error);
+                self.add(sample::round_to(codec.sample, compared.decoded[*t][lane]), *error);
             } else {
                 *error = 0.0;
-                self.add(compared.source[t][lane], 0.0);
-                self.outliers.push(index as u32);
+                self.add(compared.source[*t][lane], 0.0);
+                self.outliers.push(*index as u32);
             }
         }
         let share = codec.bound.share(errors.iter().copied());
         self.share = self.share.max(share.min(1.0)); // rounding up may exceed 1 although the bound holds
+        (self.present, self.errors) = (present, errors);
     }
 
     /// Takes the samples that must be stored exactly.
-    pub(super) fn take_outliers(&mut self, codec: &WindowCodec, samples: &[u8]) -> Outliers {
-        let size = codec.sample.size();
+    pub(super) fn take_outliers(&mut self, samples: &BoxSamples<'_>) -> Outliers {
         let mut positions = std::mem::take(&mut self.outliers);
         positions.sort_unstable();
-        let bytes = |p: &u32| &samples[*p as usize * size..(*p as usize + 1) * size];
-        let samples = positions.iter().flat_map(bytes).copied().collect();
+        let samples = positions.iter().flat_map(|position| samples.sample(*position as usize)).copied().collect();
         Outliers { positions, samples }
     }
 }

@@ -12,6 +12,7 @@
 //! samples are stored without loss: a mask, and their own bytes.
 
 use super::block_with_ghosts::BlockWithGhosts;
+use super::box_samples::BoxSamples;
 use super::buffer::{Buffer, clear};
 use super::check::Tally;
 use super::codes::Codes;
@@ -22,7 +23,6 @@ use super::load::{Missing, load_group};
 use super::refine::{Coded, Source};
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
-use crate::base::sample;
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Listed, PartKind, PartStats};
 use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 
@@ -60,13 +60,13 @@ impl Encoder {
     ) -> wavesplat_format::Result<Encoded> {
         let of: BlockWithGhosts = of.into();
         let (size, around) = (of.size, codec.outer_size(of.size));
-        let (own, outer) = (of.own(codec, samples), of.extended(codec, around, samples));
-        let samples = &own[..];
-        let missing = Missing::find(codec, samples);
-        let missing_around = (around != size).then(|| Missing::find(codec, &outer));
-        let block = Source { codec, size, samples, missing: &missing };
-        let missing_around = missing_around.as_ref().unwrap_or(&missing);
-        let outer = Source { codec, size: around, samples: &outer, missing: missing_around };
+        let extended = of.extended(codec, around, samples);
+        let missing_around = Missing::find(codec, &extended);
+        let outer = BoxSamples::whole(codec.sample, &extended, around);
+        let outer = Source { codec, size: around, samples: outer, missing: &missing_around };
+        let samples = &BoxSamples::new(codec.sample, &extended, around, size);
+        let missing = Missing::within(codec, samples, &missing_around);
+        let block = Source { codec, size, samples: *samples, missing: &missing };
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
@@ -84,7 +84,7 @@ impl Encoder {
         };
         let Parts { stats, share, mut parts } = self.smaller(codec, size, samples, &missing, coded)?;
         if missing.count > 0 {
-            pack_missing(missing.mask(), &missing.samples(codec, samples), codec.sample.size(), clear(&mut self.raw));
+            pack_missing(missing.mask(), &missing.samples(samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
             parts.sort_by_key(|part| part.kind); // exact parts come after it
@@ -105,7 +105,8 @@ impl Encoder {
     ) -> wavesplat_format::Result<(EncodedBlock, Field<'static>)> {
         let samples = of.coarse(codec, samples);
         let missing = Missing::find(codec, &samples);
-        let source = Source { codec, size: of.size, samples: &samples, missing: &missing };
+        let samples = BoxSamples::whole(codec.sample, &samples, of.size);
+        let source = Source { codec, size: of.size, samples, missing: &missing };
         let Some(pyramid) = &codec.scheme.pyramid else { return Ok(self.uncoded(codec, id, size, above)) };
         let (mut single, mut double) = (Buffer::default(), Buffer::default());
         let coded = match pyramid.single {
@@ -136,7 +137,7 @@ impl Encoder {
 
     /// Encodes every series by itself. None if the block must be stored exactly.
     fn series(&mut self, block: &Source<'_>) -> Option<Coded> {
-        let &Source { codec, samples, missing, .. } = block;
+        let &Source { codec, ref samples, missing, .. } = block;
         let voxels = block.voxels();
         let weighing = QuantizerSetup::new(codec, samples, missing.magnitude)?;
         let step = weighing.step;
@@ -153,7 +154,7 @@ impl Encoder {
             block.check(&group, first, count, &mut tally)?;
         }
         let marked = Vec::new();
-        Some(Coded { step, marked, parts: None, dropped, outliers: tally.take_outliers(codec, samples), tally })
+        Some(Coded { step, marked, parts: None, dropped, outliers: tally.take_outliers(samples), tally })
     }
 
     /// Writes a group's kept codes, k-major. Returns the energy lost by dropping and rounding.
@@ -208,12 +209,12 @@ impl Encoder {
     fn exact_parts(
         &mut self,
         codec: &WindowCodec,
-        samples: &[u8],
+        samples: &BoxSamples<'_>,
         missing: &Missing,
         listed: Option<&Listed>,
     ) -> wavesplat_format::Result<Parts> {
         let mut tally = Tally::new();
-        sample::for_each_run(codec.sample, samples, |first, values| {
+        samples.for_each_run(|first, values| {
             let present = (first..).zip(values).filter(|(sample, _)| !missing.has(*sample));
             present.for_each(|(_, value)| tally.add(*value, 0.0));
         });
@@ -225,11 +226,11 @@ impl Encoder {
                 PartKind::Listed
             }
             None => {
-                pack_exact(samples, size, &mut self.raw);
+                pack_exact(&samples.contiguous(), size, &mut self.raw);
                 PartKind::Exact
             }
         };
-        let count = (samples.len() / size) as u64;
+        let count = samples.len() as u64;
         let part = self.compressor.part(kind, PartStats { count, energy: 0.0, largest: 0.0 }, &self.raw)?;
         Ok(Parts::new(&tally, 0.0, 0.0, vec![part]))
     }
@@ -240,12 +241,14 @@ impl Encoder {
         &mut self,
         codec: &WindowCodec,
         size: [usize; 3],
-        samples: &[u8],
+        samples: &BoxSamples<'_>,
         missing: &Missing,
         coded: Parts,
     ) -> wavesplat_format::Result<Parts> {
         let mut best = coded;
-        if best.bytes() >= samples.len() / 2 && best.parts.iter().all(|part| part.kind != PartKind::Exact) {
+        if best.bytes() >= samples.len() * codec.sample.size() / 2
+            && best.parts.iter().all(|part| part.kind != PartKind::Exact)
+        {
             best = best.or(self.exact_parts(codec, samples, missing, None)?);
         }
         if let Some(listed) = listed(codec, size, samples, best.bytes()) {
@@ -275,10 +278,14 @@ struct Parts {
 }
 
 /// The samples of a block of some voxels by their values, if the file may list them and that may take less than `bytes`.
-pub(super) fn listed(codec: &WindowCodec, voxels: [usize; 3], samples: &[u8], bytes: usize) -> Option<Listed> {
-    let ([x, y, z], size) = (voxels, codec.sample.size());
-    let may_pay = codec.lists && may_be_smaller(samples, size, x * y * z, bytes);
-    may_pay.then(|| Listed::new(samples, size, [x, y, z, codec.frames()])).flatten()
+pub(super) fn listed(
+    codec: &WindowCodec,
+    [x, y, z]: [usize; 3],
+    samples: &BoxSamples<'_>,
+    bytes: usize,
+) -> Option<Listed> {
+    let may_pay = codec.lists && may_be_smaller(samples, bytes);
+    may_pay.then(|| Listed::new(&samples.contiguous(), codec.sample.size(), [x, y, z, codec.frames()])).flatten()
 }
 
 impl Parts {

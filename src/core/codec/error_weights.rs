@@ -8,7 +8,8 @@
 //! samples decide.
 
 use super::WindowCodec;
-use crate::base::sample::{self, SampleType};
+use super::box_samples::BoxSamples;
+use crate::base::sample::SampleType;
 use crate::codec::bound::{self, Bound, ErrorBound};
 use crate::wavelet::{LANES, Lane};
 
@@ -29,7 +30,7 @@ pub(super) struct QuantizerSetup {
 impl QuantizerSetup {
     /// The setup for a block whose largest sample is `magnitude`. None if no error is allowed, so that the block must
     /// be stored exactly.
-    pub(super) fn new(codec: &WindowCodec, samples: &[u8], magnitude: f64) -> Option<Self> {
+    pub(super) fn new(codec: &WindowCodec, samples: &BoxSamples<'_>, magnitude: f64) -> Option<Self> {
         let found = match codec.bound.bound {
             Bound::Relative { floor } => Self::relative(codec, magnitude, floor.max(usual_magnitude(codec, samples))),
             _ => Self::same(codec, magnitude),
@@ -85,9 +86,9 @@ fn reciprocal(error: f64) -> f64 {
 
 /// A power of two: at most one in [`MOST_SMALL`] of the samples that are neither 0 nor missing is smaller. 0 if there
 /// are no such samples.
-fn usual_magnitude(codec: &WindowCodec, samples: &[u8]) -> f64 {
+fn usual_magnitude(codec: &WindowCodec, samples: &BoxSamples<'_>) -> f64 {
     let mut counts = vec![0_usize; EXPONENTS]; // by exponent; the first counts 0 and subnormal numbers
-    sample::for_each_run(codec.sample, samples, |_, values| {
+    samples.for_each_run(|_, values| {
         for v in values.iter().filter(|v| **v != 0.0 && !codec.is_missing(**v)) {
             counts[(v.abs().to_bits() >> MANTISSA) as usize] += 1;
         }

@@ -1,12 +1,11 @@
 //! Tells whether listing the values of a block's samples may pay: whether they are few and often the same.
 
+use super::box_samples::BoxSamples;
 use std::collections::BTreeMap;
 
-/// Whether a list of the values of a block's samples (`frame * voxels + voxel`, `size` bytes each) may take less than `bytes`. Takes
-/// the entropy of a few samples, as if a sample either equals that of the frame before or is independent of it.
-pub(super) fn may_be_smaller(samples: &[u8], size: usize, voxels: usize, bytes: usize) -> bool {
-    let count = samples.len() / size;
-    let sample = |at: usize| &samples[at * size..][..size];
+/// Whether a list of the values of a block's samples may take less than `bytes`. Takes the entropy of a few samples, as if a sample either equals that of the frame before or is independent of it.
+pub(super) fn may_be_smaller(samples: &BoxSamples<'_>, bytes: usize) -> bool {
+    let (count, voxels, sample) = (samples.len(), samples.voxels(), |at: usize| samples.sample(at));
     let starts = (0..RUNS).map(|run| run * count / RUNS);
     let places = starts.flat_map(|start| (start..count).take(count.div_ceil(RUNS).min(RUN)));
     let (mut of_value, mut of_change): (BTreeMap<&[u8], usize>, BTreeMap<bool, usize>) = Default::default();
@@ -39,17 +38,23 @@ const CONTEXTS: f64 = 0.6;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::sample::SampleType;
+
+    fn may_pay(samples: &[u8], size: usize, voxels: usize, bytes: usize) -> bool {
+        let ty = if size == 1 { SampleType::U8 } else { SampleType::F32 };
+        may_be_smaller(&BoxSamples::whole(ty, samples, [voxels, 1, 1]), bytes)
+    }
 
     #[test]
     fn few_values_may_be_listed() {
         let voxels = 1000;
         let noise = |i: u32| i.wrapping_mul(0x9E37_79B1) >> 16;
         let labels: Vec<u8> = (0..8000).map(|i| (i % 1000 / 100) as u8).collect(); // as in the frame before
-        assert!(may_be_smaller(&labels, 1, voxels, 100));
+        assert!(may_pay(&labels, 1, voxels, 100));
         let counts: Vec<u8> = (0..8000).flat_map(|i| f32::from(u8::from(noise(i) % 8 == 0)).to_le_bytes()).collect();
-        assert!(may_be_smaller(&counts, 4, voxels, 400) && !may_be_smaller(&counts, 4, voxels, 300)); // 0.54 bits
+        assert!(may_pay(&counts, 4, voxels, 400) && !may_pay(&counts, 4, voxels, 300)); // 0.54 bits
         let many: Vec<u8> = (0..8000).flat_map(|i| (noise(i) as f32).to_le_bytes()).collect();
-        assert!(!may_be_smaller(&many, 4, voxels, 6000));
-        assert!(may_be_smaller(&[7], 1, 1, 1) && may_be_smaller(&[7; 100], 1, 1, 1));
+        assert!(!may_pay(&many, 4, voxels, 6000));
+        assert!(may_pay(&[7], 1, 1, 1) && may_pay(&[7; 100], 1, 1, 1));
     }
 }

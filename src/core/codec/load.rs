@@ -4,6 +4,7 @@
 //! memory than eight bytes for every sample.
 
 use super::WindowCodec;
+use super::box_samples::BoxSamples;
 use super::error_weights::QuantizerSetup;
 use super::truncate::Group;
 use crate::base::sample;
@@ -20,6 +21,7 @@ pub(super) struct Missing {
 }
 
 impl Missing {
+    /// Those of an array.
     pub(super) fn find(codec: &WindowCodec, samples: &[u8]) -> Self {
         let all = samples.len() / codec.sample.size();
         let (mut mask, mut count) = (Vec::new(), 0);
@@ -29,6 +31,14 @@ impl Missing {
             count += 1;
         });
         Self { mask, all, count, magnitude: 0.0_f64.max(-lo).max(hi) }
+    }
+
+    /// Those of a box in an array whose missing samples are `around`. If none is missing there, the magnitude is that of the array.
+    pub(super) fn within(codec: &WindowCodec, samples: &BoxSamples<'_>, around: &Self) -> Self {
+        match around.count {
+            0 => Self { mask: Vec::new(), all: samples.len(), count: 0, magnitude: around.magnitude },
+            _ => Self::find(codec, &samples.contiguous()),
+        }
     }
 
     /// Whether a sample is missing.
@@ -42,9 +52,9 @@ impl Missing {
     }
 
     /// The bytes of the missing samples, in order.
-    pub(super) fn samples(&self, codec: &WindowCodec, samples: &[u8]) -> Vec<u8> {
-        let each = samples.chunks_exact(codec.sample.size());
-        each.zip(&self.mask).filter(|(_, missing)| **missing).flat_map(|(bytes, _)| bytes).copied().collect()
+    pub(super) fn samples(&self, samples: &BoxSamples<'_>) -> Vec<u8> {
+        let missing = self.mask.iter().enumerate().filter(|(_, missing)| **missing);
+        missing.flat_map(|(index, _)| samples.sample(index)).copied().collect()
     }
 }
 
@@ -53,14 +63,14 @@ impl Missing {
 pub(super) fn load_group(
     codec: &WindowCodec,
     weighing: &QuantizerSetup,
-    samples: &[u8],
+    samples: &BoxSamples<'_>,
     missing: &Missing,
     first: usize,
     count: usize,
     group: &mut Group,
 ) {
     let voxels = missing.all / codec.frames();
-    load_lanes(codec, samples, first, count, voxels, &mut group.source);
+    samples.load_lanes(first, count, &mut group.source);
     if let (Some(weight), 0, LANES) = (weighing.common(), missing.count, count) {
         return group.weight.fill([weight; LANES]);
     }

@@ -6,6 +6,7 @@
 //! (`Basis::Samples`) may also be predicted along time.
 
 pub mod bound;
+mod box_samples;
 pub mod buffer;
 mod check;
 pub mod coarse;

@@ -4,6 +4,7 @@
 //! The step is that of eq 25 times the scheme's coarseness, less a margin for rounding in 32-bit floats. With a
 //! coarseness above 1, rounding alone may miss the bound; samples that miss it are stored exactly.
 
+use super::box_samples::BoxSamples;
 use super::buffer::{Buffer, clear};
 use super::check::{Compared, Tally};
 use super::error_weights::QuantizerSetup;
@@ -67,8 +68,7 @@ pub(super) struct Source<'a> {
     pub(super) codec: &'a WindowCodec,
     /// The number of voxels along x, y, z.
     pub(super) size: [usize; 3],
-    /// Little-endian, frame by frame.
-    pub(super) samples: &'a [u8],
+    pub(super) samples: BoxSamples<'a>,
     pub(super) missing: &'a Missing,
 }
 
@@ -92,7 +92,7 @@ impl Source<'_> {
         field: &mut Buffer<R>,
         codes: &mut Buffer<i32>,
     ) -> Option<Coded> {
-        let weighing = QuantizerSetup::new(self.codec, self.samples, self.missing.magnitude)?;
+        let weighing = QuantizerSetup::new(self.codec, &self.samples, self.missing.magnitude)?;
         let passes = self.codec.passes(pyramid, size);
         codes.renew(passes.codes());
         field.renew(passes.nodes().iter().product());
@@ -122,7 +122,7 @@ impl Source<'_> {
         }
         let Checked { marked, tally } = checked;
         let mut tally = tally?;
-        let outliers = tally.take_outliers(self.codec, self.samples);
+        let outliers = tally.take_outliers(&self.samples);
         let (listed, counts) = passes.list_coarse(codes);
         // The directory lists no other parts.
         let coded = counts.map(|count| count > 0);
@@ -187,7 +187,7 @@ impl Source<'_> {
         let mut field = Buffer::with_len(self.codec.basis.coefficients() * self.voxels());
         match self.codec.basis.rows().filter(|_| self.missing.count == 0) {
             _ if self.plain() => self.load_samples(&mut field),
-            Some(rows) => forward(rows, self.codec.sample, self.samples, &mut field),
+            Some(rows) => forward(rows, self.codec.sample, &self.samples.contiguous(), &mut field),
             None => self.load_series(weighing, &mut field),
         }
         field
@@ -195,7 +195,7 @@ impl Source<'_> {
 
     /// Loads the samples as nodes; missing samples become NaN.
     fn load_samples<R: Real>(&self, field: &mut [R]) {
-        sample::load_as(self.codec.sample, self.samples, field, R::from_f64);
+        sample::load_as(self.codec.sample, &self.samples.contiguous(), field, R::from_f64);
         if self.missing.count > 0 {
             let missing = field.iter_mut().zip(self.missing.mask()).filter(|(_, missing)| **missing);
             missing.for_each(|(node, _)| *node = R::from_f64(f64::NAN));
@@ -207,7 +207,7 @@ impl Source<'_> {
         let (codec, voxels) = (self.codec, self.voxels());
         let mut group = Group::new(codec);
         for (first, count) in lane_groups(voxels) {
-            load_group(codec, weighing, self.samples, self.missing, first, count, &mut group);
+            load_group(codec, weighing, &self.samples, self.missing, first, count, &mut group);
             codec.basis.forward(&group.source, &mut group.coefficients);
             for (k, lane) in group.coefficients.iter().enumerate() {
                 let nodes = &mut field[k * voxels + first..][..count];
@@ -222,7 +222,7 @@ impl Source<'_> {
     /// Compares samples with the field, each by itself. None if too many miss the bound.
     fn check_samples<R: Real>(&self, field: &[R]) -> Option<Tally> {
         let (mut tally, mut decoded) = (Tally::new(), Vec::new());
-        sample::for_each_run(self.codec.sample, self.samples, |first, values| {
+        self.samples.for_each_run(|first, values| {
             if !self.outliers_affordable(tally.outliers.len()) {
                 return;
             }
@@ -270,7 +270,7 @@ impl Source<'_> {
         group: &mut Group,
     ) {
         let (codec, voxels) = (self.codec, self.voxels());
-        load_group(codec, weighing, self.samples, self.missing, first, count, group);
+        load_group(codec, weighing, &self.samples, self.missing, first, count, group);
         let coefficients = &mut group.coefficients[..used.ks.len()];
         for (k, lane) in used.ks.iter().zip(&mut *coefficients) {
             let nodes = &field[k * voxels + first..][..count];

@@ -2,6 +2,7 @@
 
 use super::WindowCodec;
 use super::block_with_ghosts::{BlockWithGhosts, MaybeCopied};
+use super::box_samples::BoxSamples;
 use super::buffer::Buffer;
 use super::encode::listed;
 use super::error_weights::QuantizerSetup;
@@ -14,6 +15,7 @@ use wavesplat_format::Pyramid;
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
 pub struct Trial<'a, R: Real> {
     size: [usize; 3],
+    /// The samples of the voxels of all nodes.
     samples: MaybeCopied<'a>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
@@ -26,14 +28,20 @@ pub struct Trial<'a, R: Real> {
 impl<'a, R: Real> Trial<'a, R> {
     /// Pyramids may use the nodes of `outer` voxels.
     pub fn new(codec: &WindowCodec, of: BlockWithGhosts, outer: [usize; 3], samples: &'a [u8]) -> Self {
-        let size = of.size;
-        let (own, extended) = (of.own(codec, samples), of.extended(codec, outer, samples));
-        let around = Missing::find(codec, &extended);
-        let missing = Missing::find(codec, &own);
+        let (size, samples) = (of.size, of.extended(codec, outer, samples));
+        let around = Missing::find(codec, &samples);
+        let own = BoxSamples::new(codec.sample, &samples, outer, size);
+        let missing = Missing::within(codec, &own, &around);
         let weighing = QuantizerSetup::new(codec, &own, missing.magnitude);
-        let extended = Source { codec, size: outer, samples: &extended, missing: &around };
+        let extended = BoxSamples::whole(codec.sample, &samples, outer);
+        let extended = Source { codec, size: outer, samples: extended, missing: &around };
         let nodes = weighing.as_ref().map(|weighing| extended.load(weighing)).unwrap_or_default();
-        Self { size, samples: own, missing, weighing, nodes, outer }
+        Self { size, samples, missing, weighing, nodes, outer }
+    }
+
+    /// The samples of the box.
+    fn own(&self, codec: &WindowCodec) -> BoxSamples<'_> {
+        BoxSamples::new(codec.sample, &self.samples, self.outer, self.size)
     }
 
     /// The number of voxels in the box.
@@ -44,18 +52,23 @@ impl<'a, R: Real> Trial<'a, R> {
     /// An estimate of the bytes of the box. Missing samples are left out, because they take the same bytes under every
     /// scheme.
     pub fn bytes(&self, codec: &WindowCodec, pyramid: &Pyramid) -> usize {
-        self.coded(codec, pyramid).unwrap_or(self.samples.len())
+        self.coded(codec, pyramid).unwrap_or_else(|| self.all_bytes(codec))
+    }
+
+    /// The bytes of the box's samples.
+    fn all_bytes(&self, codec: &WindowCodec) -> usize {
+        self.own(codec).len() * codec.sample.size()
     }
 
     /// About the bytes of the box by its list of values; none if it may not be listed, or if that takes no less than `bytes`.
     pub fn listed_bytes(&self, codec: &WindowCodec, bytes: usize) -> Option<usize> {
-        let listed = listed(codec, self.size, &self.samples, bytes)?;
+        let listed = listed(codec, self.size, &self.own(codec), bytes)?;
         Some(listed.estimate(&mut Vec::new())).filter(|listed| *listed < bytes)
     }
 
     /// As [`Self::bytes`]; none if the box must be stored exactly.
     fn coded(&self, codec: &WindowCodec, pyramid: &Pyramid) -> Option<usize> {
-        let source = Source { codec, size: self.size, samples: &self.samples, missing: &self.missing };
+        let source = Source { codec, size: self.size, samples: self.own(codec), missing: &self.missing };
         let weighing = self.weighing.as_ref()?;
         let step = source.step::<R>(pyramid, weighing)?;
         let passes = codec.passes(pyramid, self.size);
@@ -69,7 +82,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let packed = |part| pyramid.packing.estimate(&passes.part_of(part, &codes));
         let packed: usize = (0..Pyramid::PARTS).map(packed).sum();
         // With too many outliers, all is stored exactly; the count still shows how near a better step is.
-        let rest = if source.outliers_affordable(outliers) { packed } else { self.samples.len() };
+        let rest = if source.outliers_affordable(outliers) { packed } else { self.all_bytes(codec) };
         Some(rest + outliers * (GAP + codec.sample.size()))
     }
 }

@@ -63,7 +63,7 @@ impl<'a> Streams<'a> {
         let mut grid = Grid::new(extents);
         let outside = vec![0; extents[0]];
         let mut significant = vec![0; grid.cells[0]];
-        let mut activity = significant.clone();
+        let (mut activity, mut marked) = (significant.clone(), vec![0; grid.cells[0] + 1]);
         for row in grid.rows() {
             let lines = lines(codes, &extents, row, &outside);
             mark(lines, &mut significant);
@@ -74,12 +74,14 @@ impl<'a> Streams<'a> {
                 *count = ONES[usize::from(byte)];
                 before = *count;
             }
-            self.add_row(lines, &significant, &activity);
+            self.add_row(lines, &significant, &activity, &mut marked);
         }
     }
 
-    /// Adds a row of cells. Takes 8 cells at once if they and their neighbours are zero.
-    fn add_row(&mut self, lines: [&[i32]; 4], significant: &[u8], activity: &[u8]) {
+    /// Adds a row of cells. Takes 8 cells at once if they and their neighbours are zero. `marked` has room for one cell more than the
+    /// row has.
+    fn add_row(&mut self, lines: [&[i32]; 4], significant: &[u8], activity: &[u8], marked: &mut [usize]) {
+        let mut found = 0;
         for (i, (bytes, around)) in significant.chunks(8).zip(activity.chunks(8)).enumerate() {
             if bytes.iter().chain(around).all(|&byte| byte == 0) {
                 self.significance[0].extend_from_slice(bytes);
@@ -87,11 +89,11 @@ impl<'a> Streams<'a> {
             }
             for (j, (&byte, &around)) in bytes.iter().zip(around).enumerate() {
                 self.significance[usize::from(CLASS_OF[usize::from(around) % ACTIVITIES])].push(byte);
-                if byte != 0 {
-                    self.add_cell(codes_of(lines, 2 * (8 * i + j)), byte, around);
-                }
+                marked[found] = 8 * i + j;
+                found += usize::from(byte != 0);
             }
         }
+        marked[..found].iter().for_each(|&x| self.add_cell(codes_of(lines, 2 * x), significant[x], activity[x]));
     }
 
     /// Adds the values of a cell. Without long values it uses no loop over them, because a processor could not predict its end.

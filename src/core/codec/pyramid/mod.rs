@@ -369,19 +369,14 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// Sorts the source's nodes of a pyramid by the passes that add them.
-    fn split<R: Real>(&self, source: &[R], [nx, ny, nz]: [usize; 3], split: &mut [R]) {
+    fn split<R: Real>(&self, source: &[R], size: [usize; 3], split: &mut [R]) {
         let mut rest = split;
         for pass in &self.passes {
-            let [x, y, z, t] = pass.extent();
-            let at = |axis: usize, i: usize| pass.nodes(axis).0 + pass.nodes(axis).1 * i;
-            for (t, z, y) in (0..t).flat_map(|t| (0..z).flat_map(move |z| (0..y).map(move |y| (t, z, y)))) {
-                let start = at(0, 0) + nx * (at(1, y) + ny * (at(2, z) + nz * at(3, t)));
-                let (row, after) = std::mem::take(&mut rest).split_at_mut(x);
-                if x > 0 {
-                    dispatch!(gather(&source[start..], pass.nodes(0).1, row));
-                }
-                rest = after;
+            let (added, after) = std::mem::take(&mut rest).split_at_mut(pass.codes());
+            if !added.is_empty() {
+                dispatch!(gather(source, size, pass, added));
             }
+            rest = after;
         }
     }
 

@@ -9,7 +9,7 @@ use super::stencil::{predict_line, taps};
 use super::within::around;
 use crate::codec::real::Real;
 use std::ops::Range;
-use wavesplat_format::Stencil;
+use wavesplat_format::{Pass, Stencil};
 
 /// The rows of a lattice along the refined axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -153,9 +153,23 @@ pub(super) fn refine_slices<R: Real>(
 /// Nodes of a slice that are predicted together along time.
 const NODES: usize = 1024;
 
+/// Copies the nodes that a pass adds, x fastest, from those of a pyramid with `size` nodes along x, y, z.
+#[inline(always)]
+pub(super) fn gather<R: Real>(source: &[R], [nx, ny, nz]: [usize; 3], pass: &Pass, added: &mut [R]) {
+    let ([x, y, z, t], nodes) = (pass.extent(), [0, 1, 2, 3].map(|axis| pass.nodes(axis)));
+    let at = |axis: usize, i: usize| nodes[axis].0 + nodes[axis].1 * i;
+    let mut rows = added.chunks_exact_mut(x);
+    for (t, z) in (0..t).flat_map(|t| (0..z).map(move |z| (t, z))) {
+        let slice = &source[nx * ny * (at(2, z) + nz * at(3, t))..];
+        for (y, row) in (0..y).zip(&mut rows) {
+            gather_line(&slice[at(0, 0) + nx * at(1, y)..], nodes[0].1, row);
+        }
+    }
+}
+
 /// Copies every n-th node of a line.
 #[inline(always)]
-pub(super) fn gather<R: Real>(line: &[R], n: usize, out: &mut [R]) {
+fn gather_line<R: Real>(line: &[R], n: usize, out: &mut [R]) {
     if n == 2 && line.len() >= 2 * out.len() {
         for (to, pair) in out.iter_mut().zip(line.as_chunks::<2>().0) {
             *to = pair[0];

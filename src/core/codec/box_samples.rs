@@ -1,0 +1,155 @@
+//! The samples of a block within an array of more voxels.
+
+use super::block_with_ghosts::{MaybeCopied, copied};
+use crate::base::sample::{self, SampleType};
+use crate::wavelet::{LANES, Lane};
+
+/// Samples of a box, frame by frame, in an array that may have more voxels along each axis. An index is `frame * voxels + voxel` in the
+/// box.
+#[derive(Clone, Copy)]
+pub(super) struct BoxSamples<'a> {
+    ty: SampleType,
+    /// Little-endian, for every voxel of the array.
+    bytes: &'a [u8],
+    /// Voxels of the array along x, y, z.
+    of: [usize; 3],
+    /// Voxels of the box, which begins with the array's first one.
+    size: [usize; 3],
+}
+
+impl<'a> BoxSamples<'a> {
+    /// The box of `size` voxels at the beginning of an array of `of` voxels.
+    pub(super) fn new(ty: SampleType, bytes: &'a [u8], of: [usize; 3], size: [usize; 3]) -> Self {
+        Self { ty, bytes, of, size }
+    }
+
+    /// An array.
+    pub(super) fn whole(ty: SampleType, bytes: &'a [u8], size: [usize; 3]) -> Self {
+        Self::new(ty, bytes, size, size)
+    }
+
+    /// The number of voxels in the box.
+    pub(super) fn voxels(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// The number of samples in the box.
+    pub(super) fn len(&self) -> usize {
+        self.frames() * self.voxels()
+    }
+
+    fn frames(&self) -> usize {
+        self.bytes.len() / (self.of.iter().product::<usize>() * self.ty.size())
+    }
+
+    fn is_whole(&self) -> bool {
+        self.of == self.size
+    }
+
+    /// The bytes of a sample.
+    pub(super) fn sample(&self, index: usize) -> &'a [u8] {
+        let (frame, voxel) = (index / self.voxels(), index % self.voxels());
+        &self.bytes[self.place(frame, voxel) * self.ty.size()..][..self.ty.size()]
+    }
+
+    /// The samples side by side.
+    pub(super) fn contiguous(&self) -> MaybeCopied<'a> {
+        match self.is_whole() {
+            true => MaybeCopied::Lent(self.bytes),
+            false => MaybeCopied::Copied(copied(self.ty, self.bytes, self.size, self.of, self.size)),
+        }
+    }
+
+    /// Calls `visit(index of the first, values)` for runs of samples, in order.
+    pub(super) fn for_each_run(&self, mut visit: impl FnMut(usize, &[f64])) {
+        if self.is_whole() {
+            return sample::for_each_run(self.ty, self.bytes, visit);
+        }
+        let (each, mut values, mut first, mut held) = (self.ty.size(), [0.0; RUN], 0, 0);
+        for row in self.rows() {
+            for part in row.chunks(RUN * each) {
+                let (now, later) = part.split_at(part.len().min((RUN - held) * each));
+                sample::load(self.ty, now, &mut values[held..held + now.len() / each]);
+                held += now.len() / each;
+                if held == RUN {
+                    visit(first, &values);
+                    (first, held) = (first + RUN, later.len() / each);
+                    sample::load(self.ty, later, &mut values[..held]);
+                }
+            }
+        }
+        if held > 0 {
+            visit(first, &values[..held]);
+        }
+    }
+
+    /// Loads the series of `count` voxels, beginning with `first`: one lane for each frame. Unused elements of lanes are zero.
+    pub(super) fn load_lanes(&self, first: usize, count: usize, out: &mut [Lane]) {
+        let (each, stride) = (self.ty.size(), self.of.iter().product());
+        let is_row = self.is_whole() || first % self.size[0] + count <= self.size[0];
+        if is_row && count == LANES {
+            return sample::load_strided(self.ty, &self.bytes[self.place(0, first) * each..], stride, out);
+        }
+        for (frame, lane) in out.iter_mut().enumerate() {
+            *lane = Lane::default();
+            for (n, value) in lane[..count].iter_mut().enumerate() {
+                let bytes = &self.bytes[self.place(frame, first + n) * each..][..each];
+                sample::load(self.ty, bytes, std::slice::from_mut(value));
+            }
+        }
+    }
+
+    /// The number of a sample in the array.
+    fn place(&self, frame: usize, voxel: usize) -> usize {
+        let ([nx, ny, nz], [x, y, _]) = (self.of, self.size);
+        voxel % x + nx * (voxel / x % y + ny * (voxel / (x * y) + nz * frame))
+    }
+
+    /// The rows along x.
+    fn rows(&self) -> impl Iterator<Item = &'a [u8]> {
+        let ([x, y, z], each, me) = (self.size, self.ty.size(), *self);
+        let starts = (0..self.frames()).flat_map(move |t| (0..y * z).map(move |row| me.place(t, row * x)));
+        starts.map(move |start| &me.bytes[start * each..][..x * each])
+    }
+}
+
+/// Samples that are visited together.
+const RUN: usize = 512;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_in_an_array_has_the_samples_of_a_copy() {
+        let (ty, of, frames) = (SampleType::F32, [29, 7, 5], 9);
+        let values: Vec<f64> = (0..of.iter().product::<usize>() * frames).map(|i| (i * 7919 % 10007) as f64).collect();
+        let mut bytes = vec![0; values.len() * ty.size()];
+        sample::store(ty, &values, &mut bytes);
+        for size in [of, [28, 6, 4], [8, 7, 5], [1, 1, 1], [29, 6, 5]] {
+            let some = BoxSamples::new(ty, &bytes, of, size);
+            let copy = some.contiguous();
+            let whole = BoxSamples::whole(ty, &copy, size);
+            let runs = |of: &BoxSamples<'_>| {
+                let mut runs = Vec::new();
+                of.for_each_run(|first, values| runs.push((first, values.to_vec())));
+                runs
+            };
+            assert_eq!(runs(&some), runs(&whole));
+            assert!((0..some.len()).all(|index| some.sample(index) == whole.sample(index)));
+            for (first, count) in crate::codec::lane_groups(some.voxels()) {
+                let lanes = |of: &BoxSamples<'_>| {
+                    let mut lanes = vec![[f64::NAN; LANES]; frames];
+                    of.load_lanes(first, count, &mut lanes);
+                    lanes
+                };
+                assert_eq!(lanes(&some), lanes(&whole), "{size:?} {first}");
+                let expected = |t: usize, l: usize| {
+                    let (v, [x, y, _]) = (first + l, size);
+                    values[v % x + of[0] * (v / x % y + of[1] * (v / (x * y) + of[2] * t))]
+                };
+                assert!((0..frames).all(|t| (0..count).all(|l| lanes(&some)[t][l] == expected(t, l))));
+            }
+        }
+    }
+}
