@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
 /// A slice that returns its memory to a pool when dropped, for a later buffer of its type on any thread. A buffer takes
-/// a spare one of at most twice its length, so the pool holds no more than buffers of each size and its half had at one time. Only
+/// a spare one of at most four times its length, so that blocks at far faces, which are smaller, need no buffers of their own. Only
 /// blocks and boxes of trials use buffers, so their sizes are few. Copies that are kept, and parts, go back to the system.
 #[derive(Debug, Default)]
 pub struct Buffer<T: Pooled> {
@@ -17,7 +17,7 @@ pub struct Buffer<T: Pooled> {
 }
 
 impl<T: Pooled> Buffer<T> {
-    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and at most twice
+    /// Creates a slice of `len` entries with arbitrary values: the smallest spare one that is long enough and at most four times
     /// as long, or a new one.
     pub fn with_len(len: usize) -> Self {
         Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
@@ -37,7 +37,7 @@ impl<T: Pooled> Buffer<T> {
 
     fn take_spare(len: usize) -> Option<Self> {
         let mut spare = spare::<T>();
-        let fits = (0..spare.len()).filter(|n| (len..=2 * len).contains(&spare[*n].len()));
+        let fits = (0..spare.len()).filter(|n| (len..=4 * len).contains(&spare[*n].len()));
         let values = fits.min_by_key(|n| spare[*n].len()).map(|n| spare.swap_remove(n));
         drop(spare);
         values.map(|values| Self::new(values, len, false))
@@ -114,16 +114,16 @@ pub trait Pooled: Pod + Default {
     fn spare() -> &'static Mutex<Vec<Zeroed<Self>>>;
 }
 
-/// Returns the memory of all unused buffers to the system.
-pub(super) fn release_spare() {
-    fn release<T: Pooled>() {
-        let unused = std::mem::take(&mut *spare::<T>());
+/// Returns the memory of unused buffers with fewer than `least` entries to the system.
+pub(super) fn release_spare(least: usize) {
+    fn release<T: Pooled>(least: usize) {
+        let unused: Vec<Zeroed<T>> = spare::<T>().extract_if(.., |values| values.len() < least).collect();
         drop(unused); // others may take buffers meanwhile
     }
-    release::<u8>();
-    release::<i32>();
-    release::<f32>();
-    release::<f64>();
+    release::<u8>(least);
+    release::<i32>(least);
+    release::<f32>(least);
+    release::<f64>(least);
 }
 
 macro_rules! pooled {

@@ -11,20 +11,39 @@ use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
 
 /// The coefficients of all series: `coefficients[k * voxels + voxel]`. `rows[k][j]` is u_k(t_j); `samples` are `[j][voxel]`,
-/// little-endian.
-pub(super) fn forward<R: Real>(rows: &[Vec<f64>], ty: SampleType, samples: &[u8], coefficients: &mut [R]) {
+/// little-endian. Returns an upper bound of the magnitudes of each k.
+pub(super) fn forward<R: Real>(rows: &[Vec<f64>], ty: SampleType, samples: &[u8], coefficients: &mut [R]) -> Vec<R> {
     let (frames, voxels) = (rows.first().map_or(0, Vec::len), coefficients.len() / rows.len().max(1));
     let rows: Vec<Vec<R>> = rows.iter().map(|row| row.iter().copied().map(R::from_f64).collect()).collect();
     let (mut some, mut sums) = (vec![[R::default(); VOXELS]; frames], vec![[R::default(); VOXELS]; rows.len()]);
+    let mut largest = vec![R::default(); rows.len()];
     for first in (0..voxels).step_by(VOXELS) {
         let count = VOXELS.min(voxels - first);
         for (series, frame) in some.iter_mut().zip(samples.chunks_exact(voxels * ty.size())) {
             sample::load_as(ty, &frame[first * ty.size()..][..count * ty.size()], &mut series[..count], R::from_f64);
         }
         dispatch!(products(&rows[..], &some[..], &mut sums[..]));
+        dispatch!(keep_largest(&sums[..], &mut largest[..]));
         for (sums, of_k) in sums.iter().zip(coefficients.chunks_exact_mut(voxels)) {
             of_k[first..][..count].copy_from_slice(&sums[..count]);
         }
+    }
+    largest
+}
+
+/// Replaces each number by the largest magnitude of the sums, if that is larger.
+#[inline(always)]
+fn keep_largest<R: Real>(sums: &[[R; VOXELS]], largest: &mut [R]) {
+    for (sums, largest) in sums.iter().zip(largest) {
+        let mut lanes = [*largest; WIDTH];
+        for sums in sums.as_chunks::<WIDTH>().0 {
+            for l in 0..WIDTH {
+                let (plus, minus) = (sums[l], R::default() - sums[l]);
+                let magnitude = if plus > minus { plus } else { minus };
+                lanes[l] = if magnitude > lanes[l] { magnitude } else { lanes[l] };
+            }
+        }
+        *largest = lanes.into_iter().fold(*largest, |a, b| if b > a { b } else { a });
     }
 }
 
@@ -93,8 +112,11 @@ mod tests {
             let rows = basis.rows().expect("a matrix");
             let mut found = vec![0.0_f64; basis.coefficients() * voxels];
             let mut singles = vec![0.0_f32; basis.coefficients() * voxels];
-            forward(rows, ty, &samples, &mut found);
+            let largest = forward(rows, ty, &samples, &mut found);
             forward(rows, ty, &samples, &mut singles);
+            for (found, largest) in found.chunks_exact(voxels).zip(largest) {
+                prop_assert!(found.iter().all(|c| c.abs() <= largest));
+            }
             for voxel in 0..voxels {
                 let series: Vec<Lane> = (0..frames).map(|t| [f64::from(values[t * voxels + voxel] as f32); LANES]).collect();
                 let mut expected = vec![Lane::default(); basis.coefficients()];

@@ -43,7 +43,13 @@ use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 
 /// Returns the memory of all unused buffers and codes to the system.
 pub fn release_spare() {
-    buffer::release_spare();
+    buffer::release_spare(usize::MAX);
+    codes::PooledCodes::release_spare();
+}
+
+/// The same for buffers that are too small for `len` entries.
+pub fn release_spare_below(len: usize) {
+    buffer::release_spare(len);
     codes::PooledCodes::release_spare();
 }
 

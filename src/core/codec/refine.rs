@@ -62,6 +62,21 @@ fn count(codes: &[i32]) -> usize {
     dispatch!(count_nonzero(codes))
 }
 
+/// The nodes that a pyramid codes, `[k][voxel]`.
+#[derive(Default)]
+pub(super) struct SourceNodes<R: Real> {
+    pub(super) values: Buffer<R>,
+    /// An upper bound of the magnitudes of each k; infinite if none is known.
+    largest: Vec<R>,
+}
+
+impl<R: Real> SourceNodes<R> {
+    /// Whether each k may have nodes of this magnitude.
+    pub(super) fn marked(&self, magnitude: R) -> Vec<bool> {
+        self.largest.iter().map(|largest| *largest >= magnitude).collect()
+    }
+}
+
 /// The samples of a block, and the codec for them.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
@@ -101,9 +116,11 @@ impl Source<'_> {
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
         let source = outer.load(&weighing);
-        let nodes = Nodes { values: &source, size: outer.size, marked: None };
-        let encode =
-            |step, field: &mut [R], codes: &mut [i32]| passes.encode(step, nodes, known, field, codes).then_some(());
+        let encode = |step, field: &mut [R], codes: &mut [i32]| {
+            let marked = source.marked(passes.negligible(step));
+            let nodes = Nodes { values: &source.values, size: outer.size, marked: Some(&marked) };
+            passes.encode(step, nodes, known, field, codes).then_some(())
+        };
         encode(step, field, codes)?;
         let check = |field: &[R], codes: &[i32]| self.checked(&weighing, &passes, known, field, codes);
         let mut checked = check(field, codes);
@@ -183,14 +200,17 @@ impl Source<'_> {
     }
 
     /// Loads the nodes that the pyramid refines.
-    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup) -> Buffer<R> {
-        let mut field = Buffer::with_len(self.codec.basis.coefficients() * self.voxels());
+    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup) -> SourceNodes<R> {
+        let mut values = Buffer::with_len(self.codec.basis.coefficients() * self.voxels());
+        let mut largest = vec![R::from_f64(f64::INFINITY); self.codec.basis.coefficients()];
         match self.codec.basis.rows().filter(|_| self.missing.count == 0) {
-            _ if self.plain() => self.load_samples(&mut field),
-            Some(rows) => forward(rows, self.codec.sample, &self.samples.contiguous(), &mut field),
-            None => self.load_series(weighing, &mut field),
+            _ if self.plain() => self.load_samples(&mut values),
+            Some(rows) => {
+                largest = forward(rows, self.codec.sample, &self.samples.contiguous(), &mut values);
+            }
+            None => self.load_series(weighing, &mut values),
         }
-        field
+        SourceNodes { values, largest }
     }
 
     /// Loads the samples as nodes; missing samples become NaN.

@@ -9,7 +9,7 @@ use super::error_weights::QuantizerSetup;
 use super::load::Missing;
 use super::pyramid::Nodes;
 use super::real::Real;
-use super::refine::Source;
+use super::refine::{Source, SourceNodes};
 use wavesplat_format::Pyramid;
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
@@ -20,7 +20,7 @@ pub struct Trial<'a, R: Real> {
     missing: Missing,
     weighing: Option<QuantizerSetup>,
     /// The nodes of the box, and the nodes beyond it that may predict them.
-    nodes: Buffer<R>,
+    nodes: SourceNodes<R>,
     /// The voxels of these nodes along x, y, z.
     outer: [usize; 3],
 }
@@ -74,7 +74,8 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         let mut field = Buffer::with_len(passes.nodes().iter().product());
         let mut codes = Buffer::with_len(passes.codes());
-        let nodes = Nodes { values: &self.nodes, size: self.outer, marked: None };
+        let marked = self.nodes.marked(passes.negligible(step));
+        let nodes = Nodes { values: &self.nodes.values, size: self.outer, marked: Some(&marked) };
         if !passes.encode(step, nodes, None, &mut field, &mut codes) {
             return None;
         }

@@ -78,6 +78,12 @@ impl ExtremeCounts {
         Self { most: self.most.join(other.most), least: self.least.join(other.least) }
     }
 
+    /// No values, to be joined with these: values that reach no end of these need not be counted.
+    pub(crate) fn none_beside(&self) -> Self {
+        let none = |peak: Peak| Peak { count: 0, next: f64::NEG_INFINITY, ..peak };
+        Self { most: none(self.most), least: none(self.least) }
+    }
+
     /// Adds values without missing ones; their range is from `lo` to `hi`.
     pub(crate) fn add(&mut self, values: &[f64], lo: f64, hi: f64) {
         if lo == hi {
@@ -209,6 +215,13 @@ mod tests {
                 added.add(part, range.0, range.1);
             }
             assert_eq!(added, whole, "{run}, one after the other");
+            let beside = values.chunks(run).fold(ExtremeCounts::NONE, |seen, part| {
+                let mut found = seen.none_beside();
+                let range = part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+                found.add(part, range.0, range.1);
+                seen.join(found)
+            });
+            assert_eq!(beside, whole, "{run}, beside those before");
         }
     }
 

@@ -101,15 +101,21 @@ pub fn scan_frame(
             let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
             bytes.resize(run.voxels() * ty.size(), 0);
             window.read_box(frame, &run, bytes)?;
-            Ok(scan_run(bytes, ty, declared, frame, (z * ny + y) * nx))
+            Ok(scan_run(bytes, ty, declared, &seen.extremes, [frame, (z * ny + y) * nx]))
         })
         .collect();
     Ok(runs?.into_iter().fold(seen, Scan::then))
 }
 
-/// Looks at a run of a frame's samples; `at` is the index of its first voxel.
-fn scan_run(bytes: &[u8], ty: SampleType, declared: Option<f64>, frame: usize, at: usize) -> Scan {
-    let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), ..Scan::NOTHING };
+/// Looks at a run of a frame's samples; `at` is the index of its first voxel. The result is to be joined with what was `seen`.
+fn scan_run(
+    bytes: &[u8],
+    ty: SampleType,
+    declared: Option<f64>,
+    seen: &ExtremeCounts,
+    [frame, at]: [usize; 2],
+) -> Scan {
+    let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), extremes: seen.none_beside(), ..Scan::NOTHING };
     let (mut range, mut extremes) = (seen.range, seen.extremes);
     let missing = |i| {
         seen.missing += 1;

@@ -18,6 +18,7 @@ use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};
+use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::real::Real;
 use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use wavesplat_core::codec::trial::Trial;
@@ -94,9 +95,22 @@ impl SchemeSelector<'_> {
             let coarseness = self.coarseness(COARSE);
             return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
+        self.take_memory();
         let smallest = if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() };
-        codec::release_spare(); // buffers of trials are too small for blocks
+        codec::release_spare_below(self.most_of_block());
         smallest
+    }
+
+    /// Makes buffers that suit blocks, so that trials use memory that blocks use later. Memory is touched when it is used.
+    fn take_memory(&self) {
+        let of_block = self.most_of_block();
+        drop([(); 3].map(|()| Buffer::<f32>::with_len(of_block)));
+        drop((Buffer::<i32>::with_len(of_block), Buffer::<u8>::with_len(of_block * self.archive.sample.size())));
+    }
+
+    /// The most samples of a block and its ghosts.
+    fn most_of_block(&self) -> usize {
+        self.frames() * self.archive.grid.dims.iter().map(|n| n.min(&self.edge) + 1).product::<usize>()
     }
 
     /// The smallest of all families with a pyramid and their variants.
@@ -248,14 +262,17 @@ impl SchemeSelector<'_> {
     }
 
     /// The axes from the roughest to the smoothest.
-    fn order(&self, boxes: &[Sampled]) -> [Axis; 4] {
+    fn order<'b>(&self, boxes: &'b [Sampled]) -> [Axis; 4] {
         let (ty, missing) = (self.archive.sample, self.config.missing_value);
-        let values = |b: &Sampled| {
-            let mut values = vec![0.0; b.samples.len() / ty.size()];
-            sample::load(ty, &b.samples, &mut values);
-            values.iter_mut().filter(|v| sample::is_missing(**v, missing)).for_each(|v| *v = f64::NAN);
+        let values = |b: &'b Sampled| {
+            let samples = &b.samples;
+            let value = move |i: usize| {
+                let mut value = 0.0;
+                sample::load(ty, &samples[i * ty.size()..][..ty.size()], std::slice::from_mut(&mut value));
+                if sample::is_missing(value, missing) { f64::NAN } else { value }
+            };
             let [x, y, z] = b.size.known;
-            (values, [x, y, z, self.frames()])
+            (value, [x, y, z, self.frames()])
         };
         roughest_first(boxes.iter().map(values), self.promise.delta)
     }

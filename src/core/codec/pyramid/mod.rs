@@ -343,8 +343,15 @@ impl<'a> PredictionPasses<'a> {
         self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
     }
 
+    /// Nodes of smaller magnitude get codes of zero, if they are predicted to be zero.
+    pub(crate) fn negligible<R: Real>(&self, step: f64) -> R {
+        let steps = self.passes.iter().map(|pass| self.pyramid.step(step, pass.level));
+        R::from_f64(LESS_THAN_HALF * steps.fold(step, f64::min))
+    }
+
     /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed.
-    /// NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass.
+    /// NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass. Where neither the source nor
+    /// known nodes mark a k, its codes are zero, and its nodes in the field arbitrary.
     pub(crate) fn encode<R: Real>(
         &self,
         step: f64,
@@ -359,6 +366,11 @@ impl<'a> PredictionPasses<'a> {
         let sources = source.values.chunks_exact(source.size.iter().product::<usize>() * self.shape[3]);
         let fields = field.chunks_exact_mut(self.pyramid_nodes());
         for (number, ((nodes, values), ranges)) in fields.zip(sources).zip(&ranges).enumerate() {
+            let ks = || self.ks(number);
+            if !ks().any(|k| source.has(k)) && known.is_none_or(|known| known.is_zero(ks())) {
+                apart(codes, ranges).into_iter().for_each(|codes| codes.fill(0));
+                continue;
+            }
             self.split(values, source.size, &mut split);
             let (codes, known) = (apart(codes, ranges), known.map(|known| self.known(number, known)));
             let mut encoding = Encoding { split: &split, codes, passes: self.inverses(step), known, fits: true };
@@ -482,6 +494,9 @@ impl<'a> PredictionPasses<'a> {
         wavelet::ranges(&self.boxes.iter().map(|of| of.at.extents[3]).collect::<Vec<_>>())
     }
 }
+
+/// Less than half, so that products with a rounded inverse of a step are, too.
+const LESS_THAN_HALF: f64 = 0.499;
 
 /// The parts of a slice at ascending ranges.
 fn apart<'a>(codes: &'a mut [i32], ranges: &[Range<usize>]) -> Vec<&'a mut [i32]> {
