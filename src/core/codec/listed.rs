@@ -1,31 +1,38 @@
 //! Tells whether listing the values of a block's samples may pay: whether they are few and often the same.
 
 use super::box_samples::BoxSamples;
-use std::collections::BTreeMap;
 
 /// Whether a list of the values of a block's samples may take less than `bytes`. Takes the entropy of a few samples, as if a sample either equals that of the frame before or is independent of it.
 pub(super) fn may_be_smaller(samples: &BoxSamples<'_>, bytes: usize) -> bool {
     let (count, voxels, sample) = (samples.len(), samples.voxels(), |at: usize| samples.sample(at));
     let starts = (0..RUNS).map(|run| run * count / RUNS);
     let places = starts.flat_map(|start| (start..count).take(count.div_ceil(RUNS).min(RUN)));
-    let (mut of_value, mut of_change): (BTreeMap<&[u8], usize>, BTreeMap<bool, usize>) = Default::default();
+    let (mut values, mut of_change) = (Vec::with_capacity(RUNS * RUN), [0; 2]);
     for at in places {
-        *of_value.entry(sample(at)).or_default() += 1;
+        values.push(number(sample(at)));
         if let Some(before) = at.checked_sub(voxels) {
-            *of_change.entry(sample(at) != sample(before)).or_default() += 1;
+            of_change[usize::from(sample(at) != sample(before))] += 1;
         }
     }
-    let (same, changed) = (of_change.get(&false).copied().unwrap_or(0), of_change.get(&true).copied().unwrap_or(0));
-    let alone = entropy(of_value.values());
-    let share = changed as f64 / (same + changed).max(1) as f64;
-    let along_time = if same + changed > 0 { entropy(of_change.values()) + share * alone } else { alone };
+    values.sort_unstable();
+    let alone = entropy(values.chunk_by(u64::eq).map(<[u64]>::len));
+    let looked_at = of_change[0] + of_change[1];
+    let share = of_change[1] as f64 / looked_at.max(1) as f64;
+    let along_time = if looked_at > 0 { entropy(of_change.into_iter()) + share * alone } else { alone };
     count as f64 * alone.min(along_time) * CONTEXTS < 8.0 * bytes as f64
 }
 
 /// The entropy of things that occur so often, in bits for each.
-fn entropy<'a>(counts: impl Iterator<Item = &'a usize> + Clone) -> f64 {
+fn entropy(counts: impl Iterator<Item = usize> + Clone) -> f64 {
     let total = counts.clone().sum::<usize>() as f64;
-    counts.map(|count| *count as f64 / total).map(|share| -share * libm::log2(share)).sum()
+    counts.filter(|count| *count > 0).map(|count| count as f64 / total).map(|share| -share * libm::log2(share)).sum()
+}
+
+/// The bytes of a sample as a number.
+fn number(sample: &[u8]) -> u64 {
+    let mut bytes = [0; 8];
+    bytes[..sample.len()].copy_from_slice(sample);
+    u64::from_le_bytes(bytes)
 }
 
 /// The number of runs of samples that are looked at, spread evenly, and the samples of a run.

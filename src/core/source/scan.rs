@@ -7,6 +7,7 @@ use crate::base::sample::{self, SampleType, join_ranges};
 use crate::source::extremes::ExtremeCounts;
 use crate::source::{FrameSource, FrameWindow};
 use rayon::prelude::*;
+use std::cell::Cell;
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// The result of a scan.
@@ -52,6 +53,11 @@ impl Scan {
 /// Bytes of the rows that are looked at together. Fixed, since the digest depends on it.
 const RUN_BYTES: usize = 256 << 10;
 
+thread_local! {
+    /// The bytes of a run. Fresh memory for every frame would take longer than looking at it.
+    static BYTES: Cell<Vec<u8>> = const { Cell::new(Vec::new()) };
+}
+
 /// Looks at every sample of a window. `declared` stands for a missing sample.
 pub fn scan(window: &dyn FrameWindow, grid: &Grid, ty: SampleType, declared: Option<f64>) -> Result<Scan> {
     (0..window.frames()).try_fold(Scan::NOTHING, |seen, frame| scan_frame(seen, window, frame, grid, ty, declared))
@@ -96,12 +102,15 @@ pub fn scan_frame(
     let runs_in_plane = ny.div_ceil(rows);
     let runs: Result<Vec<Scan>> = (0..nz * runs_in_plane)
         .into_par_iter()
-        .map_init(Vec::new, |bytes, index| {
+        .map(|index| {
             let (z, y) = (index / runs_in_plane, index % runs_in_plane * rows);
             let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
+            let mut bytes = BYTES.take();
             bytes.resize(run.voxels() * ty.size(), 0);
-            window.read_box(frame, &run, bytes)?;
-            Ok(scan_run(bytes, ty, declared, &seen.extremes, [frame, (z * ny + y) * nx]))
+            window.read_box(frame, &run, &mut bytes)?;
+            let found = scan_run(&bytes, ty, declared, &seen.extremes, [frame, (z * ny + y) * nx]);
+            BYTES.set(bytes);
+            Ok(found)
         })
         .collect();
     Ok(runs?.into_iter().fold(seen, Scan::then))

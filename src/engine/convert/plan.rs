@@ -246,7 +246,7 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     };
     // Several blocks a thread keep all threads busy. One thread is faster with one: fresh memory costs more than it waits.
     let workers = rayon::current_num_threads();
-    let enough = if workers == 1 { 1 } else { (4 * workers - 2).min(memory::MOST_BLOCKS) };
+    let enough = if workers == 1 { 1 } else { (2 * workers).min(memory::MOST_BLOCKS) };
     let fits = |room: &Room| needs(room) + archive.memory <= config.memory;
     let largest = |kept_above| (1..=enough).rev().map(|batch| Room { batch, kept_above }).find(fits);
     // More threads save more than blocks that stay decoded.
