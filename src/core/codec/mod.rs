@@ -34,6 +34,7 @@ use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::codec::bound::{ErrorBound, difference_up};
 use crate::wavelet::{self, LANES, TimeBasis};
+use buffer::Buffer;
 pub use load::load_lanes;
 use pyramid::PredictionPasses;
 use scheme::Scheme;
@@ -45,6 +46,12 @@ use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 pub fn release_spare() {
     buffer::release_spare(usize::MAX);
     codes::PooledCodes::release_spare();
+}
+
+/// Makes unused buffers for a block of `samples` samples with its ghosts. Their memory is touched when it is used.
+pub fn make_spare(samples: usize, ty: SampleType) {
+    drop([(); 3].map(|()| Buffer::<f32>::with_len(samples))); // the nodes of the source, of the field, and of those above
+    drop((Buffer::<i32>::with_len(samples), Buffer::<u8>::with_len(samples * ty.size())));
 }
 
 /// The same for buffers that are too small for `len` entries.

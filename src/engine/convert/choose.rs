@@ -18,7 +18,6 @@ use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};
-use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::real::Real;
 use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use wavesplat_core::codec::trial::Trial;
@@ -95,22 +94,11 @@ impl SchemeSelector<'_> {
             let coarseness = self.coarseness(COARSE);
             return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
-        self.take_memory();
+        let of_block = self.frames() * self.archive.grid.dims.iter().map(|n| n.min(&self.edge) + 1).product::<usize>();
+        codec::make_spare(of_block, self.archive.sample); // trials use it first
         let smallest = if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() };
-        codec::release_spare_below(self.most_of_block());
+        codec::release_spare_below(of_block);
         smallest
-    }
-
-    /// Makes buffers that suit blocks, so that trials use memory that blocks use later. Memory is touched when it is used.
-    fn take_memory(&self) {
-        let of_block = self.most_of_block();
-        drop([(); 3].map(|()| Buffer::<f32>::with_len(of_block)));
-        drop((Buffer::<i32>::with_len(of_block), Buffer::<u8>::with_len(of_block * self.archive.sample.size())));
-    }
-
-    /// The most samples of a block and its ghosts.
-    fn most_of_block(&self) -> usize {
-        self.frames() * self.archive.grid.dims.iter().map(|n| n.min(&self.edge) + 1).product::<usize>()
     }
 
     /// The smallest of all families with a pyramid and their variants.

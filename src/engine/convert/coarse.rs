@@ -1,17 +1,15 @@
 //! The coded blocks of the tiers above 0 of a window, from which the blocks below are coded.
 
 use super::Plan;
-use super::plan::SPOOLED;
+use super::coded_blocks::CodedBlocks;
 use crate::file::above::{AboveBlocks, AboveKey, PlaceAbove};
 use rayon::prelude::*;
-use std::collections::HashMap;
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
-use tempfile::{SpooledTempFile, spooled_tempfile};
-use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::error::Result;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::field::{Above, Field};
-use wavesplat_format::{BlockId, EncodedBlock, EncodedPart};
+use wavesplat_format::{BlockId, EncodedBlock};
 
 /// The coded blocks of a window's tiers above 0. Some stay decoded.
 #[derive(Debug)]
@@ -60,7 +58,8 @@ impl CoarseBlocks {
     fn field(&self, plan: &Plan<'_>, codec: &WindowCodec, id: BlockId) -> Result<Arc<Field<'static>>> {
         let key = AboveKey { id, lod: 0, wanted: vec![true; codec.basis.coefficients()] };
         self.decoded.field(&key, || {
-            let (above, coded) = (self.above(plan, codec, id)?, self.coded(|coded| coded.block(id))?);
+            let above = self.above(plan, codec, id)?;
+            let coded = self.coded(|coded| coded.block(id))?.expect("blocks of a tier are coded before those below");
             let field = Field::from_encoded(codec, &coded, plan.size(id), above.as_ref());
             field.map(Arc::new).map_err(super::bug)
         })
@@ -68,54 +67,6 @@ impl CoarseBlocks {
 
     fn coded<T>(&self, with: impl FnOnce(&mut CodedBlocks) -> io::Result<T>) -> Result<T> {
         let mut coded = self.coded.lock().unwrap_or_else(PoisonError::into_inner);
-        with(&mut coded).map_err(|e| Error::io(std::env::temp_dir(), "using a temporary file", e))
-    }
-}
-
-/// Coded blocks, their bytes one after another.
-#[derive(Debug)]
-struct CodedBlocks {
-    blocks: HashMap<BlockId, CodedBlock>,
-    bytes: SpooledTempFile,
-}
-
-/// A block whose bytes are elsewhere.
-#[derive(Debug)]
-struct CodedBlock {
-    /// Where they begin.
-    start: u64,
-    /// The number of bytes of each part.
-    lengths: Vec<usize>,
-    /// The rest.
-    block: EncodedBlock,
-}
-
-impl Default for CodedBlocks {
-    fn default() -> Self {
-        Self { blocks: HashMap::new(), bytes: spooled_tempfile(SPOOLED) }
-    }
-}
-
-impl CodedBlocks {
-    fn add(&mut self, block: &EncodedBlock) -> io::Result<()> {
-        let start = self.bytes.seek(SeekFrom::End(0))?;
-        block.parts.iter().try_for_each(|part| self.bytes.write_all(&part.stored))?;
-        let lengths = block.parts.iter().map(|part| part.stored.len()).collect();
-        let parts = block.parts.iter().map(|part| EncodedPart { stored: Vec::new(), ..*part }).collect();
-        let block = EncodedBlock { parts, ..*block };
-        self.blocks.insert(block.id, CodedBlock { start, lengths, block });
-        Ok(())
-    }
-
-    fn block(&mut self, id: BlockId) -> io::Result<EncodedBlock> {
-        let CodedBlock { start, lengths, block } =
-            self.blocks.get(&id).expect("blocks of a tier are coded before those below");
-        let mut block = block.clone();
-        self.bytes.seek(SeekFrom::Start(*start))?;
-        for (part, length) in block.parts.iter_mut().zip(lengths) {
-            part.stored.resize(*length, 0);
-            self.bytes.read_exact(&mut part.stored)?;
-        }
-        Ok(block)
+        with(&mut coded).map_err(CodedBlocks::failed)
     }
 }

@@ -346,18 +346,16 @@ impl<'a> WindowReader<'a> {
         Ok(true)
     }
 
-    /// The blocks of a window, tier after tier, as they are coded together.
+    /// The blocks of a window, tier after tier, as they are coded together: those with the same block above follow each other, so that it
+    /// is decoded once.
     fn batches(&self, job: &WindowJob) -> Vec<Vec<BlockId>> {
-        let (plan, window) = (self.plan, job.index);
-        let of_tier = |tier: u8| -> Vec<BlockId> {
-            let blocks = plan.blocks_of_tier(tier).len() as u32;
-            let of_channel =
-                |channel| (0..blocks).map(move |block| BlockId { tier, ..BlockId::new(window, channel, block) });
-            (0..plan.channels() as u16).flat_map(of_channel).collect()
-        };
-        let tiers = (0..=job.codec.tiers()).rev();
-        let batch = plan.room(&job.codec).batch;
-        tiers.flat_map(|tier| of_tier(tier).chunks(batch).map(<[BlockId]>::to_vec).collect::<Vec<_>>()).collect()
+        let (plan, tiers, room) = (self.plan, job.codec.tiers(), self.plan.room(&job.codec).batch);
+        let mut ids: Vec<BlockId> = plan.ids(job.index, tiers).collect();
+        let above = |id: &BlockId| if id.tier < tiers { plan.start.above(*id).block } else { id.block };
+        ids.sort_by_key(|id| (tiers - id.tier, id.channel, above(id)));
+        ids.chunk_by(|a, b| a.tier == b.tier)
+            .flat_map(|of_tier| of_tier.chunks(room).map(<[BlockId]>::to_vec))
+            .collect()
     }
 
     /// Reads the samples that coding one block takes, frame by frame.

@@ -17,6 +17,7 @@
 
 mod choose;
 mod coarse;
+mod coded_blocks;
 mod coded_input;
 mod coding;
 pub mod estimate;

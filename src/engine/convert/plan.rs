@@ -151,6 +151,17 @@ impl<'a> Plan<'a> {
         self.start.channels.into()
     }
 
+    /// The blocks of a window with so many tiers, as the file stores them: tier after tier, channel after channel.
+    pub(super) fn ids(&self, window: u32, tiers: u8) -> impl Iterator<Item = BlockId> + use<> {
+        let blocks: Vec<u32> = (0..=tiers).map(|tier| self.blocks_of_tier(tier).len() as u32).collect();
+        let channels = self.start.channels;
+        (0..=tiers).rev().flat_map(move |tier| {
+            let of_tier = blocks[usize::from(tier)];
+            let id = move |channel, block| BlockId { tier, ..BlockId::new(window, channel, block) };
+            (0..channels).flat_map(move |channel| (0..of_tier).map(move |block| id(channel, block)))
+        })
+    }
+
     /// The block that ends a window.
     pub(super) fn last_block(&self, window: u32) -> BlockId {
         BlockId::new(window, self.start.channels - 1, (self.blocks.len() - 1) as u32)

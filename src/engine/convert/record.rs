@@ -1,5 +1,6 @@
 //! The writer stage: appends coded blocks to the file, and sums up each window.
 
+use super::coded_blocks::CodedBlocks;
 use super::coded_input::CodedInput;
 use super::warnings::{self, Findings};
 use super::{ConvertConfig, ConvertReport, EncodedBatch, Plan, ResumePoint, Target, WindowJob};
@@ -7,13 +8,14 @@ use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
 use crossbeam_channel::Receiver;
 use std::io::Write;
+use std::iter::Peekable;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use wavesplat_core::base::description::{Description, extended, frames_of, joined, with_frames};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::progress::Progress;
 use wavesplat_core::source::Archive;
-use wavesplat_format::{Metadata, Window, WindowEnd, WindowRecord, Writer};
+use wavesplat_format::{BlockId, EncodedBlock, Metadata, Window, WindowEnd, WindowRecord, Writer};
 
 pub(super) struct WindowWriter<'a, W: Write> {
     name: &'a Path,
@@ -24,10 +26,43 @@ pub(super) struct WindowWriter<'a, W: Write> {
     out: Option<W>,
     /// The descriptions to store; empty once the file is finished.
     descriptions: Descriptions,
-    /// The sums over the blocks of the current window so far.
-    window: Option<WindowEnd>,
+    /// The current window.
+    window: Option<OpenWindow>,
     frames_before: u64,
     busy: Duration,
+}
+
+/// A window whose blocks arrive in any order.
+struct OpenWindow {
+    /// The sums over the blocks that were appended.
+    end: WindowEnd,
+    /// The blocks to append, in order.
+    next: Peekable<Box<dyn Iterator<Item = BlockId>>>,
+    /// Blocks that arrived before their turn.
+    early: CodedBlocks,
+}
+
+impl OpenWindow {
+    fn new(plan: &Plan<'_>, job: &WindowJob) -> Self {
+        let next: Box<dyn Iterator<Item = BlockId>> = Box::new(plan.ids(job.index, job.codec.tiers()));
+        Self { end: WindowEnd::empty(job.index), next: next.peekable(), early: CodedBlocks::default() }
+    }
+
+    /// Takes a block that arrived. Appends it, and those that waited for it, as soon as it is its turn.
+    fn add(&mut self, block: &EncodedBlock, mut append: impl FnMut(&EncodedBlock) -> Result<()>) -> Result<()> {
+        if self.next.next_if_eq(&block.id).is_none() {
+            return self.early.add(block).map_err(CodedBlocks::failed);
+        }
+        self.end.add(block);
+        append(block)?;
+        while let Some(id) = self.next.peek().copied() {
+            let Some(block) = self.early.take(id).map_err(CodedBlocks::failed)? else { break };
+            self.next.next();
+            self.end.add(&block);
+            append(&block)?;
+        }
+        Ok(())
+    }
 }
 
 /// The description of the frames already in the file, and that of the added frames.
@@ -93,14 +128,13 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         if self.window.is_none() {
             writer.begin_window(window_record(&batch.window)).map_err(failed)?;
         }
-        let window = self.window.get_or_insert(WindowEnd::empty(batch.window.index));
+        let window = self.window.get_or_insert_with(|| OpenWindow::new(self.plan, &batch.window));
         for encoded in &batch.blocks {
-            window.add(&encoded.block);
-            window.share = window.share.max(encoded.share);
-            writer.append(&encoded.block).map_err(failed)?;
+            window.end.share = window.end.share.max(encoded.share);
+            window.add(&encoded.block, |block| writer.append(block).map_err(failed))?;
         }
         if let Some(window) = self.window.take_if(|_| batch.last) {
-            writer.end_window(&window).map_err(failed)?;
+            writer.end_window(&window.end).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;
         }
         Ok(())
