@@ -50,7 +50,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
             "engine/file/tiers.rs",
             "engine/file/repack.rs",
             "engine/file/verify.rs",
-            "engine/convert/mod.rs",
+            "engine/convert/workers.rs",
             "engine/convert/coarse.rs",
             "engine/convert/plan.rs",
             "engine/convert/choose.rs",

@@ -32,9 +32,9 @@ pub(super) fn most_samples(block: usize) -> usize {
 }
 
 /// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
-/// trial.
-pub(super) fn bytes(block: usize, sample: SampleType) -> usize {
-    most_samples(block) * (sample.size() + 2 * (size_of::<f64>() + 1) + size_of::<f64>() + size_of::<i32>())
+/// trial. A node takes `each` bytes.
+pub(super) fn bytes(block: usize, sample: SampleType, each: usize) -> usize {
+    most_samples(block) * (sample.size() + 2 * (each + 1) + each + size_of::<i32>())
 }
 
 /// The inputs of a choice.

@@ -1,11 +1,12 @@
 //! Estimates the size of a coefficient file by coding some blocks of some windows.
 
 use super::coded_input::CodedInput;
-use super::gather::{Batch, WindowReader};
+use super::gather::WindowReader;
 use super::record::window_record;
 use super::spread::evenly;
 use super::variation::Variation;
-use super::{ConvertConfig, Encoders, Plan, WindowJob, WindowsDone, bug, encode_batch};
+use super::workers::{Encoders, encode_together};
+use super::{ConvertConfig, Plan, WindowJob, WindowsDone, bug};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -255,11 +256,10 @@ impl BlocksCoded<'_> {
         job: &Arc<WindowJob>,
     ) -> Result<f64> {
         let (ids, mut bytes, mut voxels) = (self.ids(job.index, tier), 0.0, 0);
-        for ids in ids.chunks(self.plan.room(&job.codec).batch) {
+        for ids in ids.chunks(self.plan.room(&job.codec).flight) {
             let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
-            let batch = Batch { window: job.clone(), blocks, last: false };
-            for Encoded { block, .. } in encode_batch(self.input.config.level, self.plan, &self.encoders, batch)?.blocks
-            {
+            let level = self.input.config.level;
+            for Encoded { block, .. } in encode_together(level, self.plan, &self.encoders, job, blocks)? {
                 bytes += block.stored_len() as f64 + LEAF_SHARE * block.entry_len() as f64;
                 voxels += self.plan.size(block.id).iter().product::<usize>();
             }

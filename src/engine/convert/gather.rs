@@ -19,13 +19,11 @@ use wavesplat_core::source::scan::{Scan, scan};
 use wavesplat_core::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
 use wavesplat_format::{BlockId, Features, FileId, Packing, Window};
 
-/// Blocks of one window with their samples.
+/// Blocks of one tier of a window with their samples. Before the last of a window is sent, its source was found unchanged.
 #[derive(Debug)]
 pub(super) struct Batch {
     pub(super) window: Arc<WindowJob>,
     pub(super) blocks: Vec<BlockSamples>,
-    /// Whether this is the last batch of its window. The source was still unchanged after it was read.
-    pub(super) last: bool,
 }
 
 /// The samples of a block, frame by frame.
@@ -333,11 +331,10 @@ impl<'a> WindowReader<'a> {
             let blocks = ids.iter().map(|id| self.gather(window, job, *id)).collect::<Result<Vec<_>>>()?;
             let fine = blocks.iter().filter(|block| block.id.tier == 0);
             fine.for_each(|block| self.look_at_variation(job, block));
-            let last = ids.last() == Some(&self.plan.last_block(job.index));
-            if last {
+            if ids.last() == Some(&self.plan.last_block(job.index)) {
                 window.check_unchanged()?;
             }
-            let batch = Batch { window: job.clone(), blocks, last };
+            let batch = Batch { window: job.clone(), blocks };
             *busy += started.elapsed();
             if out.send(batch).is_err() {
                 return Ok(false);
@@ -349,7 +346,7 @@ impl<'a> WindowReader<'a> {
     /// The blocks of a window, tier after tier, as they are coded together: those with the same block above follow each other, so that it
     /// is decoded once.
     fn batches(&self, job: &WindowJob) -> Vec<Vec<BlockId>> {
-        let (plan, tiers, room) = (self.plan, job.codec.tiers(), self.plan.room(&job.codec).batch);
+        let (plan, tiers, room) = (self.plan, job.codec.tiers(), self.plan.room(&job.codec).batch());
         let mut ids: Vec<BlockId> = plan.ids(job.index, tiers).collect();
         let above = |id: &BlockId| if id.tier < tiers { plan.start.above(*id).block } else { id.block };
         ids.sort_by_key(|id| (tiers - id.tier, id.channel, above(id)));

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! reader thread            workers (rayon)           writer (the caller's thread)
-//! scan a window      ->    encode a batch       ->   append in order, directory, footer
-//! gather its blocks        of blocks                 window by window
+//! scan a window      ->    encode blocks,       ->   append in order, directory, footer
+//! gather its blocks        tier after tier           window by window
 //! ```
 //!
-//! Batches keep their order. So the bytes do not depend on the number of threads, nor on the memory budget, which only
-//! sets the size of a batch. The workers are rayon's global pool. The bound of a window follows from its own samples,
+//! The writer puts blocks in order. So the bytes do not depend on the number of threads, nor on the memory budget, which only
+//! sets how many blocks are in memory. The workers are rayon's global pool. The bound of a window follows from its own samples,
 //! or, if the tolerance refers to the value range, from the range of all frames up to its end. That range never exceeds
 //! the archive's. So conversion needs only one pass over the data, and a pipe gives the same bytes as files.
 //!
@@ -38,25 +38,22 @@ mod spread;
 mod to_file;
 mod variation;
 mod warnings;
+mod workers;
 
 use crate::file::report::{BoundReport, WindowReport};
 use coarse::CoarseBlocks;
 use coded_input::CodedInput;
 pub use coding::{BestFor, SchemeConstraint, SpatialPredictor};
-use crossbeam_channel::{Receiver, Sender, bounded};
-use gather::{Batch, BlockSamples};
+use crossbeam_channel::bounded;
 pub use max_error::MaxError;
 use plan::Plan;
-use pool::Pool;
-use rayon::prelude::*;
 use record::WindowWriter;
 pub use request::ConvertRequest;
 pub use run::{Failure, append, run};
 use serde::Serialize;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 pub use to_file::convert_to_file;
 use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::description::{Description, is_of};
@@ -64,13 +61,11 @@ use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::memory;
 use wavesplat_core::base::progress::Progress;
 pub use wavesplat_core::codec::bound::{Bound, range_bound};
-use wavesplat_core::codec::buffer::Buffer;
-use wavesplat_core::codec::encode::{Encoded, Encoder};
 use wavesplat_core::codec::{self, WindowCodec};
 use wavesplat_core::colour::TransferFunction;
-use wavesplat_core::source::{Archive, ColourTransform, FrameSource};
+use wavesplat_core::source::{Archive, FrameSource};
 pub use wavesplat_format::{Basis, Packing, Stencil};
-use wavesplat_format::{BlockId, CompletePrefix, Features, FileId, Window};
+use wavesplat_format::{CompletePrefix, Features, FileId, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -312,7 +307,7 @@ pub fn convert_into<W: Write>(
         // Each stage owns its ends of the channels. When a stage ends, even by an error, its neighbours end too.
         let (plan, done) = (&plan, &done);
         let reader = scope.spawn(move || gather::read(source, input, plan, done, &to_workers));
-        let workers = scope.spawn(move || encode(config.level, plan, &from_reader, &to_writer));
+        let workers = scope.spawn(move || workers::encode(config.level, plan, &from_reader, &to_writer));
         let written = writer.write(from_workers, progress);
         let (encoded, read) = (join(workers), join(reader));
         Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
@@ -378,83 +373,9 @@ impl WindowsDone {
     }
 }
 
-/// The worker stage: encodes batches, each on all workers, until the reader ends. Returns the time spent encoding.
-fn encode(level: i32, plan: &Plan<'_>, batches: &Receiver<Batch>, out: &Sender<EncodedBatch>) -> Result<Duration> {
-    let encoders = Encoders::default();
-    let mut busy = Duration::ZERO;
-    for batch in batches {
-        let started = Instant::now();
-        let encoded = encode_batch(level, plan, &encoders, batch)?;
-        busy += started.elapsed();
-        if out.send(encoded).is_err() {
-            break; // the writer failed and reports why
-        }
-    }
-    Ok(busy)
-}
-
-type Encoders = Pool<Encoder>;
-
-/// Encodes a batch on all workers.
-fn encode_batch(
-    level: i32,
-    plan: &Plan<'_>,
-    encoders: &Encoders,
-    Batch { window, blocks, last }: Batch,
-) -> Result<EncodedBatch> {
-    let encode = |BlockSamples { id, samples }| {
-        let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
-        let samples = to_channel(plan.colour_transform, id, samples);
-        let encoded = encode_block(&mut encoder, plan, &window, id, &samples);
-        encoders.put(encoder);
-        encoded
-    };
-    window.coarse.decode_shared(plan, &window.codec, blocks.iter().map(|block| block.id))?;
-    let blocks: Result<Vec<Encoded>> = blocks.into_par_iter().map(encode).collect();
-    Ok(EncodedBatch { window: window.clone(), blocks: blocks?, last })
-}
-
-/// Encodes a block, and keeps it for the blocks below if it has some.
-fn encode_block(
-    encoder: &mut Encoder,
-    plan: &Plan<'_>,
-    window: &WindowJob,
-    id: BlockId,
-    samples: &[u8],
-) -> Result<Encoded> {
-    let above = window.coarse.above(plan, &window.codec, id)?;
-    if id.tier == 0 {
-        let extent = plan.block_with_ghosts(&window.codec, id.block as usize);
-        return encoder.block(&window.codec, id, extent, samples, above.as_ref()).map_err(bug);
-    }
-    let codec = window.codec.at(id.tier, 0);
-    let nodes = plan.coarse_nodes(&codec, id);
-    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
-    let (block, field) = coded.map_err(bug)?;
-    window.coarse.add(&codec, &block, field)?;
-    Ok(Encoded { block, share: 0.0 })
-}
-
-/// Converts the samples of a block to those of its channel.
-fn to_channel(colour_transform: Option<&ColourTransform>, id: BlockId, samples: Buffer<u8>) -> Buffer<u8> {
-    let Some(colour_transform) = colour_transform else { return samples };
-    let voxels = samples.len() / colour_transform.sample.size();
-    let mut channel = Buffer::with_len(voxels * ColourTransform::SAMPLE.size());
-    colour_transform.paint(id.channel.into(), &samples, &mut channel);
-    channel
-}
-
 /// An error for compression failures, which happen only if a size exceeds our own limits.
 fn bug(error: wavesplat_format::Error) -> Error {
     Error::CoefficientFile { path: "encoding".into(), source: error }
-}
-
-/// Coded blocks for the writer, in order.
-#[derive(Debug)]
-struct EncodedBatch {
-    window: Arc<WindowJob>,
-    blocks: Vec<Encoded>,
-    last: bool,
 }
 
 /// A window, as the reader prepared it.

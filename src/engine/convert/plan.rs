@@ -35,10 +35,17 @@ pub(super) struct Plan<'a> {
 /// The numbers of blocks that memory has room for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
-    /// Blocks that are gathered, encoded and written together.
-    pub(super) batch: usize,
+    /// Blocks that are encoded or wait for that.
+    pub(super) flight: usize,
     /// Blocks above others that stay decoded.
     pub(super) kept_above: usize,
+}
+
+impl Room {
+    /// Blocks that are gathered together.
+    pub(super) fn batch(&self) -> usize {
+        self.flight.div_ceil(2)
+    }
 }
 
 /// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
@@ -233,8 +240,8 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
     }
 }
 
-/// The numbers of blocks that fit in memory. Memory holds two batches of samples and two of coded blocks, the workers' scratch, and
-/// what choosing the next window's scheme takes. A coefficient takes `each` bytes.
+/// The numbers of blocks that fit in memory. Memory holds the samples and the codes of blocks in flight, a batch
+/// that is gathered, the workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
 fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result<Room> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
@@ -247,24 +254,25 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let has_pyramids = config.has_pyramids();
     let field = if has_pyramids { 2 * voxels * most_coefficients(config) * each } else { 0 };
     let above = if tiers > 0 { nodes_above(blocks) * most_coefficients(config) * each } else { 0 };
-    let choice = if has_pyramids { choose::bytes(samples, sample) } else { 0 };
-    let threads = |batch: usize| batch.min(rayon::current_num_threads());
+    let choice = if has_pyramids { choose::bytes(samples, sample, each) } else { 0 };
+    let workers = rayon::current_num_threads();
+    let threads = |room: &Room| room.flight.min(workers);
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
     let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + above + ZSTD_SCRATCH;
     let spool = if tiers > 0 { 2 * SPOOLED } else { 0 }; // vectors grow to twice their length
-    let needs = |Room { batch, kept_above }: &Room| {
-        batch * 4 * raw + threads(*batch) * scratch + kept_above * above + spool + choice + memory::FIXED
+    let needs = |room: &Room| {
+        let samples = (2 * room.flight + room.batch()) * raw;
+        samples + threads(room) * scratch + room.kept_above * above + spool + choice + memory::FIXED
     };
-    // Several blocks a thread keep all threads busy. One thread is faster with one: fresh memory costs more than it waits.
-    let workers = rayon::current_num_threads();
+    // One thread needs no block that waits: fresh memory costs more time than waiting.
     let enough = if workers == 1 { 1 } else { (2 * workers).min(memory::MOST_BLOCKS) };
     let fits = |room: &Room| needs(room) + archive.memory <= config.memory;
-    let largest = |kept_above| (1..=enough).rev().map(|batch| Room { batch, kept_above }).find(fits);
+    let largest = |kept_above| (1..=enough).rev().map(|flight| Room { flight, kept_above }).find(fits);
     // More threads save more than blocks that stay decoded.
     let rooms = [1, most_within(config.memory, above)].into_iter().filter_map(largest);
-    rooms.max_by_key(|room| threads(room.batch)).ok_or_else(|| {
+    rooms.max_by_key(threads).ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
-        let least = (needs(&Room { batch: 1, kept_above: 1 }) as f64 * share / MIB).ceil();
+        let least = (needs(&Room { flight: 1, kept_above: 1 }) as f64 * share / MIB).ceil();
         let (window, edge) = (config.window, blocks.edges[0]);
         let what = format!("windows of {window} frames in blocks of {edge} voxels a side need {least}MiB");
         Error::setting(

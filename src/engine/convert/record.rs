@@ -3,7 +3,8 @@
 use super::coded_blocks::CodedBlocks;
 use super::coded_input::CodedInput;
 use super::warnings::{self, Findings};
-use super::{ConvertConfig, ConvertReport, EncodedBatch, Plan, ResumePoint, Target, WindowJob};
+use super::workers::CodedBlock;
+use super::{ConvertConfig, ConvertReport, Plan, ResumePoint, Target, WindowJob};
 use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
 use crossbeam_channel::Receiver;
@@ -46,6 +47,11 @@ impl OpenWindow {
     fn new(plan: &Plan<'_>, job: &WindowJob) -> Self {
         let next: Box<dyn Iterator<Item = BlockId>> = Box::new(plan.ids(job.index, job.codec.tiers()));
         Self { end: WindowEnd::empty(job.index), next: next.peekable(), early: CodedBlocks::default() }
+    }
+
+    /// Whether all its blocks were appended.
+    fn is_complete(&mut self) -> bool {
+        self.next.peek().is_none()
     }
 
     /// Takes a block that arrived. Appends it, and those that waited for it, as soon as it is its turn.
@@ -103,37 +109,32 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         Self { name, config, plan, writer, out, descriptions, window: None, frames_before, busy: Duration::ZERO }
     }
 
-    /// Appends batches until the workers end.
-    pub(super) fn write(&mut self, batches: Receiver<EncodedBatch>, progress: &dyn Progress) -> Result<()> {
-        for batch in batches {
+    /// Appends blocks until the workers end.
+    pub(super) fn write(&mut self, blocks: Receiver<CodedBlock>, progress: &dyn Progress) -> Result<()> {
+        for block in blocks {
             let started = Instant::now();
             progress.check()?;
-            self.append(&batch)?;
-            let fine = batch.blocks.iter().filter(|encoded| encoded.block.id.tier == 0);
-            progress.advance(fine.count() as u64);
+            self.append(&block)?;
+            progress.advance(u64::from(block.coded.block.id.tier == 0));
             self.busy += started.elapsed();
         }
         Ok(())
     }
 
-    /// Appends a batch; after the last of a window, the window's end.
-    pub(super) fn append(&mut self, batch: &EncodedBatch) -> Result<()> {
+    /// Appends a block when it is its turn; after the last of a window, the window's end.
+    fn append(&mut self, CodedBlock { window: job, coded }: &CodedBlock) -> Result<()> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         if let Some(out) = self.out.take() {
-            self.writer = Some(
-                Writer::with_features(out, batch.window.id, &self.plan.start, batch.window.features).map_err(failed)?,
-            );
+            self.writer = Some(Writer::with_features(out, job.id, &self.plan.start, job.features).map_err(failed)?);
         }
-        let writer = self.writer.as_mut().expect("created with the first batch");
+        let writer = self.writer.as_mut().expect("created with the first block");
         if self.window.is_none() {
-            writer.begin_window(window_record(&batch.window)).map_err(failed)?;
+            writer.begin_window(window_record(job)).map_err(failed)?;
         }
-        let window = self.window.get_or_insert_with(|| OpenWindow::new(self.plan, &batch.window));
-        for encoded in &batch.blocks {
-            window.end.share = window.end.share.max(encoded.share);
-            window.add(&encoded.block, |block| writer.append(block).map_err(failed))?;
-        }
-        if let Some(window) = self.window.take_if(|_| batch.last) {
+        let window = self.window.get_or_insert_with(|| OpenWindow::new(self.plan, job));
+        window.end.share = window.end.share.max(coded.share);
+        window.add(&coded.block, |block| writer.append(block).map_err(failed))?;
+        if let Some(window) = self.window.take_if(OpenWindow::is_complete) {
             writer.end_window(&window.end).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;
         }

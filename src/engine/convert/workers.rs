@@ -1,0 +1,197 @@
+//! The workers: encode blocks as they come, on all threads.
+
+use super::gather::{Batch, BlockSamples};
+use super::plan::Room;
+use super::pool::Pool;
+use super::{Plan, WindowJob, bug};
+use crossbeam_channel::{Receiver, Sender, select, unbounded};
+use rayon::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use wavesplat_core::base::error::Result;
+use wavesplat_core::codec::buffer::Buffer;
+use wavesplat_core::codec::encode::{Encoded, Encoder};
+use wavesplat_core::source::ColourTransform;
+use wavesplat_format::BlockId;
+
+pub(super) type Encoders = Pool<Encoder>;
+
+/// A coded block for the writer.
+#[derive(Debug)]
+pub(super) struct CodedBlock {
+    pub(super) window: Arc<WindowJob>,
+    pub(super) coded: Encoded,
+}
+
+/// What a task sends when it has ended, even by a panic.
+type Ended = std::thread::Result<Result<CodedBlock>>;
+
+/// Encodes the blocks that the reader sends until it ends. Returns the time spent encoding.
+///
+/// A block begins with nodes of the block above it, so a tier begins when the one above it is finished. Blocks of a tier are finished
+/// in any order.
+pub(super) fn encode(
+    level: i32,
+    plan: &Plan<'_>,
+    batches: &Receiver<Batch>,
+    out: &Sender<CodedBlock>,
+) -> Result<Duration> {
+    let (encoders, (ended, all_ended)) = (Encoders::default(), unbounded::<Ended>());
+    rayon::in_place_scope(|scope| {
+        let mut flight = Flight::new(all_ended, out);
+        let mut before: Vec<BlockId> = Vec::new();
+        while let Some(Batch { window, blocks }) = flight.next(batches)? {
+            let ids: Vec<BlockId> = blocks.iter().map(|block| block.id).collect();
+            if before.last().is_some_and(|last| (last.window, last.tier) != (ids[0].window, ids[0].tier)) {
+                flight.land()?;
+                before.clear();
+            }
+            flight.make_room(plan.room(&window.codec));
+            let (job, both) = (window.clone(), [&before[..], &ids].concat());
+            // A failure shows again when a block needs what is above it.
+            scope.spawn(move |_| drop(job.coarse.decode_shared(plan, &job.codec, both.into_iter())));
+            for block in blocks {
+                let (window, ended, encoders) = (window.clone(), ended.clone(), &encoders);
+                flight.add();
+                scope.spawn(move |_| {
+                    let coded = catch_unwind(AssertUnwindSafe(|| encode_next(level, plan, encoders, &window, block)));
+                    let _ = ended.send(coded.map(|coded| Ok(CodedBlock { window, coded: coded? }))); // none waits after an error
+                });
+            }
+            before = ids;
+        }
+        flight.land()?;
+        Ok(flight.busy)
+    })
+}
+
+/// The blocks that are being encoded.
+struct Flight<'a> {
+    ended: Receiver<Ended>,
+    out: &'a Sender<CodedBlock>,
+    blocks: usize,
+    /// Blocks that may still be encoded when the next batch is taken.
+    most: usize,
+    /// Whether the writer has ended. If it failed, it reports why.
+    is_over: bool,
+    /// When the first of them began.
+    began: Instant,
+    busy: Duration,
+}
+
+impl<'a> Flight<'a> {
+    fn new(ended: Receiver<Ended>, out: &'a Sender<CodedBlock>) -> Self {
+        Self { ended, out, blocks: 0, most: 0, is_over: false, began: Instant::now(), busy: Duration::ZERO }
+    }
+
+    fn make_room(&mut self, room: Room) {
+        self.most = room.flight - room.batch();
+    }
+
+    /// The next batch, as soon as there is room for it; none if the reader or the writer has ended.
+    fn next(&mut self, batches: &Receiver<Batch>) -> Result<Option<Batch>> {
+        while self.blocks > self.most {
+            self.land_one()?;
+        }
+        while !self.is_over {
+            let ended = self.ended.clone();
+            select! {
+                recv(batches) -> batch => return Ok(batch.ok()),
+                recv(ended) -> ended => self.pass_on(ended.expect(OPEN))?,
+            }
+        }
+        Ok(None)
+    }
+
+    fn add(&mut self) {
+        if self.blocks == 0 {
+            self.began = Instant::now();
+        }
+        self.blocks += 1;
+    }
+
+    /// Waits until no block is being encoded.
+    fn land(&mut self) -> Result<()> {
+        while self.blocks > 0 {
+            self.land_one()?;
+        }
+        Ok(())
+    }
+
+    fn land_one(&mut self) -> Result<()> {
+        let ended = self.ended.recv().expect(OPEN);
+        self.pass_on(ended)
+    }
+
+    /// Sends a coded block to the writer.
+    fn pass_on(&mut self, ended: Ended) -> Result<()> {
+        self.blocks -= 1;
+        if self.blocks == 0 {
+            self.busy += self.began.elapsed();
+        }
+        let coded = ended.unwrap_or_else(|panic| resume_unwind(panic))?;
+        self.is_over |= self.out.send(coded).is_err();
+        Ok(())
+    }
+}
+
+/// Tasks have senders, and so has the stage.
+const OPEN: &str = "a sender that is in scope";
+
+/// Encodes some blocks of a window on all threads.
+pub(super) fn encode_together(
+    level: i32,
+    plan: &Plan<'_>,
+    encoders: &Encoders,
+    window: &WindowJob,
+    blocks: Vec<BlockSamples>,
+) -> Result<Vec<Encoded>> {
+    window.coarse.decode_shared(plan, &window.codec, blocks.iter().map(|block| block.id))?;
+    blocks.into_par_iter().map(|block| encode_next(level, plan, encoders, window, block)).collect()
+}
+
+/// Encodes a block with an encoder that is not in use.
+fn encode_next(
+    level: i32,
+    plan: &Plan<'_>,
+    encoders: &Encoders,
+    window: &WindowJob,
+    BlockSamples { id, samples }: BlockSamples,
+) -> Result<Encoded> {
+    let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+    let samples = to_channel(plan.colour_transform, id, samples);
+    let encoded = encode_block(&mut encoder, plan, window, id, &samples);
+    encoders.put(encoder);
+    encoded
+}
+
+/// Encodes a block, and keeps it for the blocks below if it has some.
+fn encode_block(
+    encoder: &mut Encoder,
+    plan: &Plan<'_>,
+    window: &WindowJob,
+    id: BlockId,
+    samples: &[u8],
+) -> Result<Encoded> {
+    let above = window.coarse.above(plan, &window.codec, id)?;
+    if id.tier == 0 {
+        let extent = plan.block_with_ghosts(&window.codec, id.block as usize);
+        return encoder.block(&window.codec, id, extent, samples, above.as_ref()).map_err(bug);
+    }
+    let codec = window.codec.at(id.tier, 0);
+    let nodes = plan.coarse_nodes(&codec, id);
+    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
+    let (block, field) = coded.map_err(bug)?;
+    window.coarse.add(&codec, &block, field)?;
+    Ok(Encoded { block, share: 0.0 })
+}
+
+/// Converts the samples of a block to those of its channel.
+fn to_channel(colour_transform: Option<&ColourTransform>, id: BlockId, samples: Buffer<u8>) -> Buffer<u8> {
+    let Some(colour_transform) = colour_transform else { return samples };
+    let voxels = samples.len() / colour_transform.sample.size();
+    let mut channel = Buffer::with_len(voxels * ColourTransform::SAMPLE.size());
+    colour_transform.paint(id.channel.into(), &samples, &mut channel);
+    channel
+}
