@@ -80,6 +80,8 @@ pub(super) struct Found<'a, 'b> {
     /// The codes so far, with room for more: a cell writes 8, and keeps as many as it has.
     codes: &'a mut SparseCodes,
     count: usize,
+    /// The largest length of the lists.
+    most: usize,
     /// The low bits of large values.
     bits: BitReader<'b>,
     /// Whether an invalid symbol was found.
@@ -89,17 +91,19 @@ pub(super) struct Found<'a, 'b> {
 impl<'a, 'b> Found<'a, 'b> {
     /// Appends at most `most` codes.
     pub(super) fn new(codes: &'a mut SparseCodes, most: usize, bits: BitReader<'b>) -> Self {
-        codes.places.reserve(most + ROOM);
-        codes.values.reserve(most + ROOM);
-        Self { count: codes.values.len(), codes, bits, invalid: false }
+        codes.places.reserve(most + BEHIND);
+        codes.values.reserve(most + BEHIND);
+        let count = codes.values.len();
+        Self { count, most: count + most + BEHIND, codes, bits, invalid: false }
     }
 
-    /// Makes room for the codes of so many cells. Memory is touched when it is needed.
+    /// Makes room for the codes of so many cells, but for no more than were announced. Memory is touched when it is needed.
     pub(super) fn make_room(&mut self, cells: usize) {
-        let most = self.count + 8 * cells;
-        if most > self.codes.values.len() {
-            self.codes.places.resize(most + ROOM, 0);
-            self.codes.values.resize(most + ROOM, 0);
+        let len = self.most.min(self.count + 8 * cells);
+        if len > self.codes.values.len() {
+            let len = self.most.min(len + ROOM);
+            self.codes.places.resize(len, 0);
+            self.codes.values.resize(len, 0);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::block_with_ghosts::{MaybeCopied, copied};
 use crate::base::sample::{self, SampleType};
+use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane};
 
 /// Samples of a box, frame by frame, in an array that may have more voxels along each axis. An index is `frame * voxels + voxel` in the
@@ -83,6 +84,13 @@ impl<'a> BoxSamples<'a> {
         }
     }
 
+    /// The largest magnitude of the samples, none of which is missing.
+    pub(super) fn magnitude(&self) -> f64 {
+        let mut largest = 0.0;
+        self.for_each_run(|_, values| largest = dispatch!(larger(values, largest)));
+        largest
+    }
+
     /// Loads the series of `count` voxels, beginning with `first`: one lane for each frame. Unused elements of lanes are zero.
     pub(super) fn load_lanes(&self, first: usize, count: usize, out: &mut [Lane]) {
         let (each, stride) = (self.ty.size(), self.of.iter().product());
@@ -113,6 +121,19 @@ impl<'a> BoxSamples<'a> {
     }
 }
 
+/// The largest magnitude of some values and of `largest`.
+#[inline(always)]
+fn larger(values: &[f64], largest: f64) -> f64 {
+    let mut lanes = [largest; 2 * LANES];
+    let (some, last) = values.as_chunks::<{ 2 * LANES }>();
+    for values in some {
+        for (largest, v) in lanes.iter_mut().zip(values) {
+            *largest = if v.abs() > *largest { v.abs() } else { *largest };
+        }
+    }
+    last.iter().map(|v| v.abs()).chain(lanes).fold(largest, f64::max)
+}
+
 /// Samples that are visited together.
 const RUN: usize = 512;
 
@@ -120,10 +141,17 @@ const RUN: usize = 512;
 mod tests {
     use super::*;
 
+    fn values_of(bytes: &[u8]) -> Vec<f64> {
+        let mut values = vec![0.0; bytes.len() / 4];
+        sample::load(SampleType::F32, bytes, &mut values);
+        values
+    }
+
     #[test]
     fn a_box_in_an_array_has_the_samples_of_a_copy() {
         let (ty, of, frames) = (SampleType::F32, [29, 7, 5], 9);
-        let values: Vec<f64> = (0..of.iter().product::<usize>() * frames).map(|i| (i * 7919 % 10007) as f64).collect();
+        let values: Vec<f64> =
+            (0..of.iter().product::<usize>() * frames).map(|i| (i * 7919 % 10007) as f64 - 6000.0).collect();
         let mut bytes = vec![0; values.len() * ty.size()];
         sample::store(ty, &values, &mut bytes);
         for size in [of, [28, 6, 4], [8, 7, 5], [1, 1, 1], [29, 6, 5]] {
@@ -136,6 +164,8 @@ mod tests {
                 runs
             };
             assert_eq!(runs(&some), runs(&whole));
+            let all = values_of(&copy);
+            assert_eq!(some.magnitude(), all.iter().fold(0.0, |most: f64, v| most.max(v.abs())));
             assert!((0..some.len()).all(|index| some.sample(index) == whole.sample(index)));
             for (first, count) in crate::codec::lane_groups(some.voxels()) {
                 let lanes = |of: &BoxSamples<'_>| {

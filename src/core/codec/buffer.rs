@@ -115,15 +115,9 @@ pub trait Pooled: Pod + Default {
 }
 
 /// Returns the memory of unused buffers with fewer than `least` entries to the system.
-pub(super) fn release_spare(least: usize) {
-    fn release<T: Pooled>(least: usize) {
-        let unused: Vec<Zeroed<T>> = spare::<T>().extract_if(.., |values| values.len() < least).collect();
-        drop(unused); // others may take buffers meanwhile
-    }
-    release::<u8>(least);
-    release::<i32>(least);
-    release::<f32>(least);
-    release::<f64>(least);
+pub(super) fn release_spare<T: Pooled>(least: usize) {
+    let unused: Vec<Zeroed<T>> = spare::<T>().extract_if(.., |values| values.len() < least).collect();
+    drop(unused); // others may take buffers meanwhile
 }
 
 macro_rules! pooled {

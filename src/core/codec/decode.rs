@@ -268,7 +268,7 @@ impl Block {
         Field::refined(codec, Stored { part: Some(part), ..self.stored() }, wanted)
     }
 
-    /// The block in no more memory than it needs.
+    /// The block, to be kept for long: its list of codes takes no more memory than it needs.
     pub fn to_keep(mut self) -> Self {
         self.codes.keep();
         self

@@ -33,10 +33,10 @@ impl Missing {
         Self { mask, all, count, magnitude: 0.0_f64.max(-lo).max(hi) }
     }
 
-    /// Those of a box in an array whose missing samples are `around`. If none is missing there, the magnitude is that of the array.
+    /// Those of a box in an array whose missing samples are `around`.
     pub(super) fn within(codec: &WindowCodec, samples: &BoxSamples<'_>, around: &Self) -> Self {
         match around.count {
-            0 => Self { mask: Vec::new(), all: samples.len(), count: 0, magnitude: around.magnitude },
+            0 => Self { mask: Vec::new(), all: samples.len(), count: 0, magnitude: samples.magnitude() },
             _ => Self::find(codec, &samples.contiguous()),
         }
     }

@@ -37,6 +37,7 @@ use crate::wavelet::{self, LANES, TimeBasis};
 use buffer::Buffer;
 pub use load::load_lanes;
 use pyramid::PredictionPasses;
+use real::Real;
 use scheme::Scheme;
 use std::ops::Range;
 use std::sync::Arc;
@@ -44,20 +45,29 @@ use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 
 /// Returns the memory of all unused buffers and codes to the system.
 pub fn release_spare() {
-    buffer::release_spare(usize::MAX);
+    buffer::release_spare::<f32>(usize::MAX);
+    buffer::release_spare::<f64>(usize::MAX);
+    release_spare_below::<f64>(usize::MAX);
+}
+
+/// The same for buffers with fewer than `len` entries; of floats, only for those of type `R`.
+pub fn release_spare_below<R: Real>(len: usize) {
+    buffer::release_spare::<R>(len);
+    buffer::release_spare::<i32>(len);
+    buffer::release_spare::<u8>(len);
     codes::PooledCodes::release_spare();
 }
 
-/// Makes unused buffers for a block of `samples` samples with its ghosts. Their memory is touched when it is used.
-pub fn make_spare(samples: usize, ty: SampleType) {
-    drop([(); 3].map(|()| Buffer::<f32>::with_len(samples))); // the nodes of the source, of the field, and of those above
+/// Makes unused buffers to code a block of `samples` samples with its ghosts in floats of type `R`, in place of those of the other type.
+/// Their memory is touched when it is used.
+pub fn make_spare<R: Real>(samples: usize, ty: SampleType) {
+    if size_of::<R>() == size_of::<f32>() {
+        buffer::release_spare::<f64>(usize::MAX);
+    } else {
+        buffer::release_spare::<f32>(usize::MAX);
+    }
+    drop([(); 3].map(|()| Buffer::<R>::with_len(samples))); // the nodes of the source, of the field, and of those above
     drop((Buffer::<i32>::with_len(samples), Buffer::<u8>::with_len(samples * ty.size())));
-}
-
-/// The same for buffers that are too small for `len` entries.
-pub fn release_spare_below(len: usize) {
-    buffer::release_spare(len);
-    codes::PooledCodes::release_spare();
 }
 
 /// What coding and decoding share for all blocks of one window.

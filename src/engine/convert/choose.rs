@@ -94,15 +94,19 @@ impl SchemeSelector<'_> {
             let coarseness = self.coarseness(COARSE);
             return Ok(self.codec(&Scheme { functions, coarseness, ..Scheme::along_time(basis) }));
         }
-        let of_block = self.frames() * self.archive.grid.dims.iter().map(|n| n.min(&self.edge) + 1).product::<usize>();
-        codec::make_spare(of_block, self.archive.sample); // trials use it first
-        let smallest = if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() };
-        codec::release_spare_below(of_block);
-        smallest
+        if self.single() { self.smallest::<f32>() } else { self.smallest::<f64>() }
     }
 
     /// The smallest of all families with a pyramid and their variants.
     fn smallest<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
+        let block = |more: usize| self.archive.grid.dims.iter().map(|n| n.min(&self.edge) + more).product::<usize>();
+        codec::make_spare::<R>(self.frames() * block(1), self.archive.sample); // trials use it first
+        let smallest = self.smallest_of::<R>();
+        codec::release_spare_below::<R>(self.frames() * block(0));
+        smallest
+    }
+
+    fn smallest_of<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
         let boxes = self.boxes()?;
         let families = self.families(&self.order(&boxes))?;
         let (mut learned, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|f| f.basis == Basis::Learned);

@@ -27,11 +27,16 @@ struct CodedBlock {
 
 impl Default for CodedBlocks {
     fn default() -> Self {
-        Self { blocks: HashMap::new(), bytes: spooled_tempfile(SPOOLED) }
+        Self::new(SPOOLED)
     }
 }
 
 impl CodedBlocks {
+    /// No blocks, and so many bytes in memory before there is a temporary file.
+    pub(super) fn new(in_memory: usize) -> Self {
+        Self { blocks: HashMap::new(), bytes: spooled_tempfile(in_memory) }
+    }
+
     /// Adds a block.
     pub(super) fn add(&mut self, block: &EncodedBlock) -> io::Result<()> {
         let start = self.bytes.seek(SeekFrom::End(0))?;
@@ -55,7 +60,7 @@ impl CodedBlocks {
         Ok(Some(block))
     }
 
-    /// Takes a block that was added. The last one makes room for others.
+    /// Takes a block that was added. When none is left, the bytes are dropped.
     pub(super) fn take(&mut self, id: BlockId) -> io::Result<Option<EncodedBlock>> {
         let block = self.block(id)?;
         if self.blocks.remove(&id).is_some() && self.blocks.is_empty() {

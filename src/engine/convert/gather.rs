@@ -1,4 +1,4 @@
-//! The reader stage: reads windows of frames and sends batches of blocks.
+//! The reader stage: reads windows of frames and sends blocks.
 
 use super::choose::{SchemeSelector, most_samples};
 use super::coarse::CoarseBlocks;
@@ -19,11 +19,11 @@ use wavesplat_core::source::scan::{Scan, scan};
 use wavesplat_core::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
 use wavesplat_format::{BlockId, Features, FileId, Packing, Window};
 
-/// Blocks of one tier of a window with their samples. Before the last of a window is sent, its source was found unchanged.
+/// A block of a window to encode. Before the last of a window is sent, its source was found unchanged.
 #[derive(Debug)]
-pub(super) struct Batch {
+pub(super) struct NextBlock {
     pub(super) window: Arc<WindowJob>,
-    pub(super) blocks: Vec<BlockSamples>,
+    pub(super) block: BlockSamples,
 }
 
 /// The samples of a block, frame by frame.
@@ -40,7 +40,7 @@ pub(super) fn read(
     input: &CodedInput,
     plan: &Plan<'_>,
     done: &WindowsDone,
-    out: &Sender<Batch>,
+    out: &Sender<NextBlock>,
 ) -> Result<(Duration, Findings)> {
     let mut reader = WindowReader::new(input, plan, done);
     done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
@@ -323,36 +323,34 @@ impl<'a> WindowReader<'a> {
         &mut self,
         window: &dyn FrameWindow,
         job: &Arc<WindowJob>,
-        out: &Sender<Batch>,
+        out: &Sender<NextBlock>,
         busy: &mut Duration,
     ) -> Result<bool> {
-        for ids in self.batches(job) {
+        for id in self.in_order_of_coding(job) {
             let started = Instant::now();
-            let blocks = ids.iter().map(|id| self.gather(window, job, *id)).collect::<Result<Vec<_>>>()?;
-            let fine = blocks.iter().filter(|block| block.id.tier == 0);
-            fine.for_each(|block| self.look_at_variation(job, block));
-            if ids.last() == Some(&self.plan.last_block(job.index)) {
+            let block = self.gather(window, job, id)?;
+            if id.tier == 0 {
+                self.look_at_variation(job, &block);
+            }
+            if id == self.plan.last_block(job.index) {
                 window.check_unchanged()?;
             }
-            let batch = Batch { window: job.clone(), blocks };
             *busy += started.elapsed();
-            if out.send(batch).is_err() {
+            if out.send(NextBlock { window: job.clone(), block }).is_err() {
                 return Ok(false);
             }
         }
         Ok(true)
     }
 
-    /// The blocks of a window, tier after tier, as they are coded together: those with the same block above follow each other, so that it
-    /// is decoded once.
-    fn batches(&self, job: &WindowJob) -> Vec<Vec<BlockId>> {
-        let (plan, tiers, room) = (self.plan, job.codec.tiers(), self.plan.room(&job.codec).batch());
+    /// The blocks of a window, tier after tier, as they are coded: those with the same block above follow each other, so that it is
+    /// decoded once.
+    fn in_order_of_coding(&self, job: &WindowJob) -> Vec<BlockId> {
+        let (plan, tiers) = (self.plan, job.codec.tiers());
         let mut ids: Vec<BlockId> = plan.ids(job.index, tiers).collect();
         let above = |id: &BlockId| if id.tier < tiers { plan.start.above(*id).block } else { id.block };
         ids.sort_by_key(|id| (tiers - id.tier, id.channel, above(id)));
-        ids.chunk_by(|a, b| a.tier == b.tier)
-            .flat_map(|of_tier| of_tier.chunks(room).map(<[BlockId]>::to_vec))
-            .collect()
+        ids
     }
 
     /// Reads the samples that coding one block takes, frame by frame.

@@ -35,17 +35,10 @@ pub(super) struct Plan<'a> {
 /// The numbers of blocks that memory has room for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
-    /// Blocks that are encoded or wait for that.
+    /// Blocks whose samples and codes are in memory: they wait for a worker, are encoded, or go to the writer.
     pub(super) flight: usize,
     /// Blocks above others that stay decoded.
     pub(super) kept_above: usize,
-}
-
-impl Room {
-    /// Blocks that are gathered together.
-    pub(super) fn batch(&self) -> usize {
-        self.flight.div_ceil(2)
-    }
 }
 
 /// The default block edge in voxels: the largest that keeps blocks near 4 MiB without a pyramid and near 14 MiB with one,
@@ -169,6 +162,12 @@ impl<'a> Plan<'a> {
         })
     }
 
+    /// Counts the pairs of layers of blocks along z: the blocks of a pair share those above.
+    pub(super) fn pair_of_layers(&self, id: BlockId) -> usize {
+        let [nx, ny, _] = self.blocks_of_tier(id.tier).counts();
+        id.block as usize / (2 * nx * ny)
+    }
+
     /// The block that ends a window.
     pub(super) fn last_block(&self, window: u32) -> BlockId {
         BlockId::new(window, self.start.channels - 1, (self.blocks.len() - 1) as u32)
@@ -240,8 +239,8 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
     }
 }
 
-/// The numbers of blocks that fit in memory. Memory holds the samples and the codes of blocks in flight, a batch
-/// that is gathered, the workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
+/// The numbers of blocks that fit in memory. Memory holds the samples and the codes of blocks in flight, one
+/// block that is gathered, the workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
 fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result<Room> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
@@ -259,9 +258,9 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let threads = |room: &Room| room.flight.min(workers);
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
     let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + above + ZSTD_SCRATCH;
-    let spool = if tiers > 0 { 2 * SPOOLED } else { 0 }; // vectors grow to twice their length
+    let spool = if tiers > 0 { 3 * 2 * SPOOLED } else { 0 }; // vectors grow to twice their length
     let needs = |room: &Room| {
-        let samples = (2 * room.flight + room.batch()) * raw;
+        let samples = (2 * room.flight + 1) * raw;
         samples + threads(room) * scratch + room.kept_above * above + spool + choice + memory::FIXED
     };
     // One thread needs no block that waits: fresh memory costs more time than waiting.
@@ -291,7 +290,7 @@ fn most_coefficients(config: &ConvertConfig) -> usize {
     }
 }
 
-/// Bytes of coded blocks above others that stay in memory; more go to a temporary file.
+/// Bytes of coded blocks that wait in memory; more go to a temporary file.
 pub(super) const SPOOLED: usize = 1 << 18;
 
 /// An upper bound of the memory of a zstd context at the offered levels, for inputs of a few MiB.

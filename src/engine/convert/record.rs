@@ -8,6 +8,7 @@ use super::{ConvertConfig, ConvertReport, Plan, ResumePoint, Target, WindowJob};
 use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
 use crossbeam_channel::Receiver;
+use std::borrow::Cow;
 use std::io::Write;
 use std::iter::Peekable;
 use std::path::Path;
@@ -39,14 +40,17 @@ struct OpenWindow {
     end: WindowEnd,
     /// The blocks to append, in order.
     next: Peekable<Box<dyn Iterator<Item = BlockId>>>,
-    /// Blocks that arrived before their turn.
-    early: CodedBlocks,
+    /// Blocks that arrived before their turn: those of even pairs of layers, and of odd ones. When a pair is complete, its bytes are
+    /// dropped. Without tiers, few blocks ever wait.
+    early: [CodedBlocks; 2],
 }
 
 impl OpenWindow {
     fn new(plan: &Plan<'_>, job: &WindowJob) -> Self {
-        let next: Box<dyn Iterator<Item = BlockId>> = Box::new(plan.ids(job.index, job.codec.tiers()));
-        Self { end: WindowEnd::empty(job.index), next: next.peekable(), early: CodedBlocks::default() }
+        let tiers = job.codec.tiers();
+        let next: Box<dyn Iterator<Item = BlockId>> = Box::new(plan.ids(job.index, tiers));
+        let early = [(); 2].map(|()| if tiers > 0 { CodedBlocks::default() } else { CodedBlocks::new(usize::MAX) });
+        Self { end: WindowEnd::empty(job.index), next: next.peekable(), early }
     }
 
     /// Whether all its blocks were appended.
@@ -55,19 +59,26 @@ impl OpenWindow {
     }
 
     /// Takes a block that arrived. Appends it, and those that waited for it, as soon as it is its turn.
-    fn add(&mut self, block: &EncodedBlock, mut append: impl FnMut(&EncodedBlock) -> Result<()>) -> Result<()> {
-        if self.next.next_if_eq(&block.id).is_none() {
-            return self.early.add(block).map_err(CodedBlocks::failed);
+    fn add(
+        &mut self,
+        plan: &Plan<'_>,
+        block: &EncodedBlock,
+        mut append: impl FnMut(&EncodedBlock) -> Result<()>,
+    ) -> Result<()> {
+        let waiting = |id: BlockId| plan.pair_of_layers(id) % 2;
+        if self.next.peek() != Some(&block.id) {
+            return self.early[waiting(block.id)].add(block).map_err(CodedBlocks::failed);
         }
-        self.end.add(block);
-        append(block)?;
-        while let Some(id) = self.next.peek().copied() {
-            let Some(block) = self.early.take(id).map_err(CodedBlocks::failed)? else { break };
+        let mut block = Cow::Borrowed(block);
+        loop {
             self.next.next();
             self.end.add(&block);
             append(&block)?;
+            let Some(id) = self.next.peek().copied() else { return Ok(()) };
+            let early = self.early[waiting(id)].take(id).map_err(CodedBlocks::failed)?;
+            let Some(early) = early else { return Ok(()) };
+            block = Cow::Owned(early);
         }
-        Ok(())
     }
 }
 
@@ -133,7 +144,7 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         }
         let window = self.window.get_or_insert_with(|| OpenWindow::new(self.plan, job));
         window.end.share = window.end.share.max(coded.share);
-        window.add(&coded.block, |block| writer.append(block).map_err(failed))?;
+        window.add(self.plan, &coded.block, |block| writer.append(block).map_err(failed))?;
         if let Some(window) = self.window.take_if(OpenWindow::is_complete) {
             writer.end_window(&window.end).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;

@@ -1,6 +1,6 @@
 //! The workers: encode blocks as they come, on all threads.
 
-use super::gather::{Batch, BlockSamples};
+use super::gather::{BlockSamples, NextBlock};
 use super::plan::Room;
 use super::pool::Pool;
 use super::{Plan, WindowJob, bug};
@@ -34,32 +34,29 @@ type Ended = std::thread::Result<Result<CodedBlock>>;
 pub(super) fn encode(
     level: i32,
     plan: &Plan<'_>,
-    batches: &Receiver<Batch>,
+    blocks: &Receiver<NextBlock>,
     out: &Sender<CodedBlock>,
 ) -> Result<Duration> {
     let (encoders, (ended, all_ended)) = (Encoders::default(), unbounded::<Ended>());
     rayon::in_place_scope(|scope| {
         let mut flight = Flight::new(all_ended, out);
-        let mut before: Vec<BlockId> = Vec::new();
-        while let Some(Batch { window, blocks }) = flight.next(batches)? {
-            let ids: Vec<BlockId> = blocks.iter().map(|block| block.id).collect();
-            if before.last().is_some_and(|last| (last.window, last.tier) != (ids[0].window, ids[0].tier)) {
-                flight.land()?;
-                before.clear();
+        let mut before: Option<BlockId> = None;
+        while let Some(NextBlock { window, block }) = flight.next(blocks)? {
+            let id = block.id;
+            match before.replace(id) {
+                Some(before) if (before.window, before.tier) != (id.window, id.tier) => flight.land()?,
+                Some(before) => {
+                    let job = window.clone();
+                    scope.spawn(move |_| job.coarse.decode_ahead(plan, &job.codec, before, id));
+                }
+                None => {}
             }
-            flight.make_room(plan.room(&window.codec));
-            let (job, both) = (window.clone(), [&before[..], &ids].concat());
-            // A failure shows again when a block needs what is above it.
-            scope.spawn(move |_| drop(job.coarse.decode_shared(plan, &job.codec, both.into_iter())));
-            for block in blocks {
-                let (window, ended, encoders) = (window.clone(), ended.clone(), &encoders);
-                flight.add();
-                scope.spawn(move |_| {
-                    let coded = catch_unwind(AssertUnwindSafe(|| encode_next(level, plan, encoders, &window, block)));
-                    let _ = ended.send(coded.map(|coded| Ok(CodedBlock { window, coded: coded? }))); // none waits after an error
-                });
-            }
-            before = ids;
+            flight.add(plan.room(&window.codec));
+            let (ended, encoders) = (ended.clone(), &encoders);
+            scope.spawn(move |_| {
+                let coded = catch_unwind(AssertUnwindSafe(|| encode_next(level, plan, encoders, &window, block)));
+                let _ = ended.send(coded.map(|coded| Ok(CodedBlock { window, coded: coded? }))); // none waits after an error
+            });
         }
         flight.land()?;
         Ok(flight.busy)
@@ -71,7 +68,7 @@ struct Flight<'a> {
     ended: Receiver<Ended>,
     out: &'a Sender<CodedBlock>,
     blocks: usize,
-    /// Blocks that may still be encoded when the next batch is taken.
+    /// The most blocks in flight.
     most: usize,
     /// Whether the writer has ended. If it failed, it reports why.
     is_over: bool,
@@ -82,29 +79,27 @@ struct Flight<'a> {
 
 impl<'a> Flight<'a> {
     fn new(ended: Receiver<Ended>, out: &'a Sender<CodedBlock>) -> Self {
-        Self { ended, out, blocks: 0, most: 0, is_over: false, began: Instant::now(), busy: Duration::ZERO }
+        Self { ended, out, blocks: 0, most: 1, is_over: false, began: Instant::now(), busy: Duration::ZERO }
     }
 
-    fn make_room(&mut self, room: Room) {
-        self.most = room.flight - room.batch();
-    }
-
-    /// The next batch, as soon as there is room for it; none if the reader or the writer has ended.
-    fn next(&mut self, batches: &Receiver<Batch>) -> Result<Option<Batch>> {
-        while self.blocks > self.most {
+    /// The next block, as soon as there is room for it; none if the reader or the writer has ended.
+    fn next(&mut self, blocks: &Receiver<NextBlock>) -> Result<Option<NextBlock>> {
+        while self.blocks >= self.most {
             self.land_one()?;
         }
         while !self.is_over {
             let ended = self.ended.clone();
             select! {
-                recv(batches) -> batch => return Ok(batch.ok()),
+                recv(blocks) -> block => return Ok(block.ok()),
                 recv(ended) -> ended => self.pass_on(ended.expect(OPEN))?,
             }
         }
         Ok(None)
     }
 
-    fn add(&mut self) {
+    /// Adds a block of a window for which there is so much room.
+    fn add(&mut self, room: Room) {
+        self.most = room.flight;
         if self.blocks == 0 {
             self.began = Instant::now();
         }

@@ -74,8 +74,8 @@ impl CoefficientFile {
         Ok(DecodedBlock { block, field })
     }
 
-    /// As [`Self::block`]. Uses what was unpacked, and keeps it if `keeps`: the codes take less memory than coefficients and most of
-    /// the time.
+    /// As [`Self::block`]. Uses what was unpacked, and keeps it if `keeps`: codes take less memory than coefficients, and unpacking takes
+    /// most of the time.
     fn unpacked(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool], keeps: bool) -> Result<Arc<Block>> {
         let unpack = || self.block(codec, entry, wanted);
         let Some(kept) = &self.kept else { return unpack().map(Arc::new) };
@@ -266,7 +266,7 @@ impl CoefficientFile {
         if !keeps || !kept.has_room(bytes) {
             return Ok(None);
         }
-        let block = self.block(codec, entry, &all)?;
+        let block = self.block(codec, entry, &all)?.to_keep();
         let (field, bytes_read) = (Some(block.refined(codec, &all)), block.bytes_read);
         let decoded = Arc::new(DecodedBlock { block: Arc::new(block), field });
         kept.keep_block(key, &decoded);
