@@ -12,7 +12,7 @@ pub(super) const SYMBOLS: u32 = LONG + 4 * (32 - 8) + 4;
 /// Codes for which there is room at a time.
 const ROOM: usize = 4 << 10;
 
-/// Bytes after the symbols, so that 8 symbols can be read at each of them.
+/// Entries after symbols and after codes, so that 8 can be read or written at each place.
 pub(super) const BEHIND: usize = 8;
 
 /// Positions of the ones in each byte, lowest first, filled up with the highest.
@@ -80,7 +80,7 @@ pub(super) struct Found<'a, 'b> {
     /// The codes so far, with room for more: a cell writes 8, and keeps as many as it has.
     codes: &'a mut SparseCodes,
     count: usize,
-    /// The largest length of the lists.
+    /// The lists never get longer than this.
     most: usize,
     /// The low bits of large values.
     bits: BitReader<'b>,
@@ -97,7 +97,7 @@ impl<'a, 'b> Found<'a, 'b> {
         Self { count, most: count + most + BEHIND, codes, bits, invalid: false }
     }
 
-    /// Makes room for the codes of so many cells, but for no more than were announced. Memory is touched when it is needed.
+    /// Makes room for the codes of so many cells, but for no more codes than were announced. Memory is touched when it is needed.
     pub(super) fn make_room(&mut self, cells: usize) {
         let len = self.most.min(self.count + 8 * cells);
         if len > self.codes.values.len() {

@@ -43,7 +43,8 @@ impl<'a> BoxSamples<'a> {
         self.bytes.len() / (self.of.iter().product::<usize>() * self.ty.size())
     }
 
-    fn is_whole(&self) -> bool {
+    /// Whether it is the whole array.
+    pub(super) fn is_whole(&self) -> bool {
         self.of == self.size
     }
 
@@ -131,7 +132,7 @@ fn larger(values: &[f64], largest: f64) -> f64 {
             *largest = if v.abs() > *largest { v.abs() } else { *largest };
         }
     }
-    last.iter().map(|v| v.abs()).chain(lanes).fold(largest, f64::max)
+    last.iter().map(|v| v.abs()).chain(lanes).fold(0.0, f64::max)
 }
 
 /// Samples that are visited together.

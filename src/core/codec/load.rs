@@ -33,10 +33,13 @@ impl Missing {
         Self { mask, all, count, magnitude: 0.0_f64.max(-lo).max(hi) }
     }
 
-    /// Those of a box in an array whose missing samples are `around`.
+    /// The missing samples of a box. `around` describes those of the whole array.
     pub(super) fn within(codec: &WindowCodec, samples: &BoxSamples<'_>, around: &Self) -> Self {
         match around.count {
-            0 => Self { mask: Vec::new(), all: samples.len(), count: 0, magnitude: samples.magnitude() },
+            0 => {
+                let magnitude = if samples.is_whole() { around.magnitude } else { samples.magnitude() };
+                Self { mask: Vec::new(), all: samples.len(), count: 0, magnitude }
+            }
             _ => Self::find(codec, &samples.contiguous()),
         }
     }

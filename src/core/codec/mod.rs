@@ -46,11 +46,10 @@ use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
 /// Returns the memory of all unused buffers and codes to the system.
 pub fn release_spare() {
     buffer::release_spare::<f32>(usize::MAX);
-    buffer::release_spare::<f64>(usize::MAX);
     release_spare_below::<f64>(usize::MAX);
 }
 
-/// The same for buffers with fewer than `len` entries; of floats, only for those of type `R`.
+/// Returns unused buffers with fewer than `len` entries, and all unused codes, to the system. Of the floats, only those of type `R`.
 pub fn release_spare_below<R: Real>(len: usize) {
     buffer::release_spare::<R>(len);
     buffer::release_spare::<i32>(len);
@@ -58,8 +57,8 @@ pub fn release_spare_below<R: Real>(len: usize) {
     codes::PooledCodes::release_spare();
 }
 
-/// Makes unused buffers to code a block of `samples` samples with its ghosts in floats of type `R`, in place of those of the other type.
-/// Their memory is touched when it is used.
+/// Makes spare buffers for coding a block of `samples` samples with its ghosts in floats of type `R`. Gives back those of the other type.
+/// Pages take memory only when they are written.
 pub fn make_spare<R: Real>(samples: usize, ty: SampleType) {
     if size_of::<R>() == size_of::<f32>() {
         buffer::release_spare::<f64>(usize::MAX);

@@ -100,7 +100,7 @@ impl SchemeSelector<'_> {
     /// The smallest of all families with a pyramid and their variants.
     fn smallest<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
         let block = |more: usize| self.archive.grid.dims.iter().map(|n| n.min(&self.edge) + more).product::<usize>();
-        codec::make_spare::<R>(self.frames() * block(1), self.archive.sample); // trials use it first
+        codec::make_spare::<R>(self.frames() * block(1), self.archive.sample); // trials use these before blocks do
         let smallest = self.smallest_of::<R>();
         codec::release_spare_below::<R>(self.frames() * block(0));
         smallest

@@ -45,19 +45,6 @@ impl CoarseBlocks {
         above.par_iter().try_for_each(|id| self.field(plan, &codec.at(id.tier, 0), *id).map(drop))
     }
 
-    /// Decodes the block above the next one ahead, if it stays decoded beside that above the one before.
-    pub(super) fn decode_ahead(&self, plan: &Plan<'_>, codec: &WindowCodec, before: BlockId, next: BlockId) {
-        let tiers = codec.tiers();
-        if next.tier >= tiers || before.tier != next.tier {
-            return;
-        }
-        let [before, next] = [before, next].map(|id| plan.start.above(id));
-        if before != next && self.decoded.staying(&plan.start, tiers, [before, next].into()).len() == 2 {
-            // The error is met again by the block that needs it.
-            drop(self.field(plan, &codec.at(next.tier, 0), next));
-        }
-    }
-
     /// The nodes that a block begins with; none in the last tier.
     pub(super) fn above(&self, plan: &Plan<'_>, codec: &WindowCodec, id: BlockId) -> Result<Option<Above>> {
         let codec = codec.at(id.tier, 0);

@@ -27,16 +27,11 @@ struct CodedBlock {
 
 impl Default for CodedBlocks {
     fn default() -> Self {
-        Self::new(SPOOLED)
+        Self { blocks: HashMap::new(), bytes: spooled_tempfile(SPOOLED) }
     }
 }
 
 impl CodedBlocks {
-    /// No blocks, and so many bytes in memory before there is a temporary file.
-    pub(super) fn new(in_memory: usize) -> Self {
-        Self { blocks: HashMap::new(), bytes: spooled_tempfile(in_memory) }
-    }
-
     /// Adds a block.
     pub(super) fn add(&mut self, block: &EncodedBlock) -> io::Result<()> {
         let start = self.bytes.seek(SeekFrom::End(0))?;
@@ -60,7 +55,7 @@ impl CodedBlocks {
         Ok(Some(block))
     }
 
-    /// Takes a block that was added. When none is left, the bytes are dropped.
+    /// Removes and returns a block. Drops all bytes when no block is left.
     pub(super) fn take(&mut self, id: BlockId) -> io::Result<Option<EncodedBlock>> {
         let block = self.block(id)?;
         if self.blocks.remove(&id).is_some() && self.blocks.is_empty() {

@@ -19,7 +19,7 @@ use wavesplat_core::source::scan::{Scan, scan};
 use wavesplat_core::source::{Archive, ColourWindow, FrameSource, FrameWindow, read_frames_into};
 use wavesplat_format::{BlockId, Features, FileId, Packing, Window};
 
-/// A block of a window to encode. Before the last of a window is sent, its source was found unchanged.
+/// A block to encode. The last one of a window is sent only after its source was found unchanged.
 #[derive(Debug)]
 pub(super) struct NextBlock {
     pub(super) window: Arc<WindowJob>,
@@ -343,8 +343,8 @@ impl<'a> WindowReader<'a> {
         Ok(true)
     }
 
-    /// The blocks of a window, tier after tier, as they are coded: those with the same block above follow each other, so that it is
-    /// decoded once.
+    /// The blocks of a window in the order in which they are coded, tier after tier. Blocks with the same block above follow each other,
+    /// so that it is decoded once.
     fn in_order_of_coding(&self, job: &WindowJob) -> Vec<BlockId> {
         let (plan, tiers) = (self.plan, job.codec.tiers());
         let mut ids: Vec<BlockId> = plan.ids(job.index, tiers).collect();

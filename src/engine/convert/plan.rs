@@ -35,7 +35,7 @@ pub(super) struct Plan<'a> {
 /// The numbers of blocks that memory has room for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
-    /// Blocks whose samples and codes are in memory: they wait for a worker, are encoded, or go to the writer.
+    /// Blocks that wait for a worker or are encoded.
     pub(super) flight: usize,
     /// Blocks above others that stay decoded.
     pub(super) kept_above: usize,
@@ -162,10 +162,10 @@ impl<'a> Plan<'a> {
         })
     }
 
-    /// Counts the pairs of layers of blocks along z: the blocks of a pair share those above.
+    /// The number of the pair of layers along z that a block lies in, counted through all channels. Blocks of a pair share those above.
     pub(super) fn pair_of_layers(&self, id: BlockId) -> usize {
-        let [nx, ny, _] = self.blocks_of_tier(id.tier).counts();
-        id.block as usize / (2 * nx * ny)
+        let [nx, ny, nz] = self.blocks_of_tier(id.tier).counts();
+        usize::from(id.channel) * nz.div_ceil(2) + id.block as usize / (2 * nx * ny)
     }
 
     /// The block that ends a window.
@@ -239,8 +239,7 @@ fn start(input: &CodedInput, edge: usize) -> Metadata {
     }
 }
 
-/// The numbers of blocks that fit in memory. Memory holds the samples and the codes of blocks in flight, one
-/// block that is gathered, the workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
+/// The numbers of blocks that fit in memory. Memory holds samples and codes of blocks, the workers' scratch, and what choosing the next window's scheme takes. A coefficient takes `each` bytes.
 fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result<Room> {
     let CodedInput { config, archive, colour_transform } = input;
     let sample = archive.sample;
@@ -258,10 +257,18 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let threads = |room: &Room| room.flight.min(workers);
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
     let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + above + ZSTD_SCRATCH;
-    let spool = if tiers > 0 { 3 * 2 * SPOOLED } else { 0 }; // vectors grow to twice their length
+    // The blocks above and two lists of blocks that wait; vectors grow to twice their length.
+    let spool = if tiers > 0 { 3 * 2 * SPOOLED } else { 0 };
     let needs = |room: &Room| {
-        let samples = (2 * room.flight + 1) * raw;
-        samples + threads(room) * scratch + room.kept_above * above + spool + choice + memory::FIXED
+        // The samples of blocks in flight and of one that is gathered; the codes of as many, of those that overtook one, and of two that
+        // are written.
+        let waiting = if room.flight > 1 { room.flight } else { 0 };
+        (2 * room.flight + waiting + 3) * raw
+            + threads(room) * scratch
+            + room.kept_above * above
+            + spool
+            + choice
+            + memory::FIXED
     };
     // One thread needs no block that waits: fresh memory costs more time than waiting.
     let enough = if workers == 1 { 1 } else { (2 * workers).min(memory::MOST_BLOCKS) };

@@ -8,7 +8,7 @@ use super::{ConvertConfig, ConvertReport, Plan, ResumePoint, Target, WindowJob};
 use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
 use crossbeam_channel::Receiver;
-use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io::Write;
 use std::iter::Peekable;
 use std::path::Path;
@@ -40,16 +40,43 @@ struct OpenWindow {
     end: WindowEnd,
     /// The blocks to append, in order.
     next: Peekable<Box<dyn Iterator<Item = BlockId>>>,
-    /// Blocks that arrived before their turn: those of even pairs of layers, and of odd ones. When a pair is complete, its bytes are
-    /// dropped. Without tiers, few blocks ever wait.
-    early: [CodedBlocks; 2],
+    early: Early,
+}
+
+/// Blocks that arrived before their turn.
+enum Early {
+    /// Without tiers, few blocks wait: those that overtook another.
+    Few(HashMap<BlockId, EncodedBlock>),
+    /// With tiers, a layer of blocks waits for the one before: one list for even pairs of layers, one for odd ones. A list drops its bytes
+    /// when it is empty.
+    Layers([CodedBlocks; 2]),
+}
+
+impl Early {
+    fn add(&mut self, plan: &Plan<'_>, block: EncodedBlock) -> Result<()> {
+        match self {
+            Self::Few(blocks) => {
+                blocks.insert(block.id, block);
+                Ok(())
+            }
+            Self::Layers(lists) => lists[plan.pair_of_layers(block.id) % 2].add(&block).map_err(CodedBlocks::failed),
+        }
+    }
+
+    /// Removes and returns a block if it has arrived.
+    fn take(&mut self, plan: &Plan<'_>, id: BlockId) -> Result<Option<EncodedBlock>> {
+        match self {
+            Self::Few(blocks) => Ok(blocks.remove(&id)),
+            Self::Layers(lists) => lists[plan.pair_of_layers(id) % 2].take(id).map_err(CodedBlocks::failed),
+        }
+    }
 }
 
 impl OpenWindow {
     fn new(plan: &Plan<'_>, job: &WindowJob) -> Self {
         let tiers = job.codec.tiers();
         let next: Box<dyn Iterator<Item = BlockId>> = Box::new(plan.ids(job.index, tiers));
-        let early = [(); 2].map(|()| if tiers > 0 { CodedBlocks::default() } else { CodedBlocks::new(usize::MAX) });
+        let early = if tiers > 0 { Early::Layers(Default::default()) } else { Early::Few(HashMap::new()) };
         Self { end: WindowEnd::empty(job.index), next: next.peekable(), early }
     }
 
@@ -58,26 +85,23 @@ impl OpenWindow {
         self.next.peek().is_none()
     }
 
-    /// Takes a block that arrived. Appends it, and those that waited for it, as soon as it is its turn.
+    /// Takes a block that arrived. If it is its turn, appends it and the blocks that waited for it; else keeps it.
     fn add(
         &mut self,
         plan: &Plan<'_>,
-        block: &EncodedBlock,
+        mut block: EncodedBlock,
         mut append: impl FnMut(&EncodedBlock) -> Result<()>,
     ) -> Result<()> {
-        let waiting = |id: BlockId| plan.pair_of_layers(id) % 2;
         if self.next.peek() != Some(&block.id) {
-            return self.early[waiting(block.id)].add(block).map_err(CodedBlocks::failed);
+            return self.early.add(plan, block);
         }
-        let mut block = Cow::Borrowed(block);
         loop {
             self.next.next();
             self.end.add(&block);
             append(&block)?;
             let Some(id) = self.next.peek().copied() else { return Ok(()) };
-            let early = self.early[waiting(id)].take(id).map_err(CodedBlocks::failed)?;
-            let Some(early) = early else { return Ok(()) };
-            block = Cow::Owned(early);
+            let Some(early) = self.early.take(plan, id)? else { return Ok(()) };
+            block = early;
         }
     }
 }
@@ -125,26 +149,27 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         for block in blocks {
             let started = Instant::now();
             progress.check()?;
-            self.append(&block)?;
-            progress.advance(u64::from(block.coded.block.id.tier == 0));
+            let is_fine = block.coded.block.id.tier == 0;
+            self.append(block)?;
+            progress.advance(u64::from(is_fine));
             self.busy += started.elapsed();
         }
         Ok(())
     }
 
     /// Appends a block when it is its turn; after the last of a window, the window's end.
-    fn append(&mut self, CodedBlock { window: job, coded }: &CodedBlock) -> Result<()> {
+    fn append(&mut self, CodedBlock { window: job, coded }: CodedBlock) -> Result<()> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         if let Some(out) = self.out.take() {
             self.writer = Some(Writer::with_features(out, job.id, &self.plan.start, job.features).map_err(failed)?);
         }
         let writer = self.writer.as_mut().expect("created with the first block");
         if self.window.is_none() {
-            writer.begin_window(window_record(job)).map_err(failed)?;
+            writer.begin_window(window_record(&job)).map_err(failed)?;
         }
-        let window = self.window.get_or_insert_with(|| OpenWindow::new(self.plan, job));
+        let window = self.window.get_or_insert_with(|| OpenWindow::new(self.plan, &job));
         window.end.share = window.end.share.max(coded.share);
-        window.add(self.plan, &coded.block, |block| writer.append(block).map_err(failed))?;
+        window.add(self.plan, coded.block, |block| writer.append(block).map_err(failed))?;
         if let Some(window) = self.window.take_if(OpenWindow::is_complete) {
             writer.end_window(&window.end).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;

@@ -6,6 +6,7 @@ use super::pool::Pool;
 use super::{Plan, WindowJob, bug};
 use crossbeam_channel::{Receiver, Sender, select, unbounded};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -25,7 +26,11 @@ pub(super) struct CodedBlock {
 }
 
 /// What a task sends when it has ended, even by a panic.
-type Ended = std::thread::Result<Result<CodedBlock>>;
+struct Ended {
+    /// The number of the block in the order of coding.
+    number: u64,
+    coded: std::thread::Result<Result<CodedBlock>>,
+}
 
 /// Encodes the blocks that the reader sends until it ends. Returns the time spent encoding.
 ///
@@ -40,22 +45,18 @@ pub(super) fn encode(
     let (encoders, (ended, all_ended)) = (Encoders::default(), unbounded::<Ended>());
     rayon::in_place_scope(|scope| {
         let mut flight = Flight::new(all_ended, out);
-        let mut before: Option<BlockId> = None;
+        let mut before: Option<(u32, u8)> = None;
         while let Some(NextBlock { window, block }) = flight.next(blocks)? {
-            let id = block.id;
-            match before.replace(id) {
-                Some(before) if (before.window, before.tier) != (id.window, id.tier) => flight.land()?,
-                Some(before) => {
-                    let job = window.clone();
-                    scope.spawn(move |_| job.coarse.decode_ahead(plan, &job.codec, before, id));
-                }
-                None => {}
+            let tier = (block.id.window, block.id.tier);
+            if before.replace(tier).is_some_and(|before| before != tier) {
+                flight.land()?;
             }
-            flight.add(plan.room(&window.codec));
+            let number = flight.add(plan.room(&window.codec));
             let (ended, encoders) = (ended.clone(), &encoders);
             scope.spawn(move |_| {
                 let coded = catch_unwind(AssertUnwindSafe(|| encode_next(level, plan, encoders, &window, block)));
-                let _ = ended.send(coded.map(|coded| Ok(CodedBlock { window, coded: coded? }))); // none waits after an error
+                let coded = coded.map(|coded| Ok(CodedBlock { window, coded: coded? }));
+                let _ = ended.send(Ended { number, coded }); // after an error nobody receives
             });
         }
         flight.land()?;
@@ -67,8 +68,11 @@ pub(super) fn encode(
 struct Flight<'a> {
     ended: Receiver<Ended>,
     out: &'a Sender<CodedBlock>,
-    blocks: usize,
-    /// The most blocks in flight.
+    /// The numbers of the blocks, and the number of the next one.
+    blocks: BTreeSet<u64>,
+    next: u64,
+    /// The most blocks in flight. No block begins before all those are finished that are twice as many ahead of it: so few coded blocks wait
+    /// for one that takes long.
     most: usize,
     /// Whether the writer has ended. If it failed, it reports why.
     is_over: bool,
@@ -79,12 +83,13 @@ struct Flight<'a> {
 
 impl<'a> Flight<'a> {
     fn new(ended: Receiver<Ended>, out: &'a Sender<CodedBlock>) -> Self {
-        Self { ended, out, blocks: 0, most: 1, is_over: false, began: Instant::now(), busy: Duration::ZERO }
+        let (blocks, next, most, is_over) = (BTreeSet::new(), 0, 1, false);
+        Self { ended, out, blocks, next, most, is_over, began: Instant::now(), busy: Duration::ZERO }
     }
 
     /// The next block, as soon as there is room for it; none if the reader or the writer has ended.
     fn next(&mut self, blocks: &Receiver<NextBlock>) -> Result<Option<NextBlock>> {
-        while self.blocks >= self.most {
+        while self.is_full() {
             self.land_one()?;
         }
         while !self.is_over {
@@ -97,18 +102,26 @@ impl<'a> Flight<'a> {
         Ok(None)
     }
 
-    /// Adds a block of a window for which there is so much room.
-    fn add(&mut self, room: Room) {
+    fn is_full(&self) -> bool {
+        let is_far = |oldest: &u64| self.next - oldest >= 2 * self.most as u64;
+        self.blocks.len() >= self.most || self.blocks.first().is_some_and(is_far)
+    }
+
+    /// Counts a block, whose window has this room. Returns its number.
+    fn add(&mut self, room: Room) -> u64 {
         self.most = room.flight;
-        if self.blocks == 0 {
+        if self.blocks.is_empty() {
             self.began = Instant::now();
         }
-        self.blocks += 1;
+        let number = self.next;
+        self.blocks.insert(number);
+        self.next += 1;
+        number
     }
 
     /// Waits until no block is being encoded.
     fn land(&mut self) -> Result<()> {
-        while self.blocks > 0 {
+        while !self.blocks.is_empty() {
             self.land_one()?;
         }
         Ok(())
@@ -120,18 +133,18 @@ impl<'a> Flight<'a> {
     }
 
     /// Sends a coded block to the writer.
-    fn pass_on(&mut self, ended: Ended) -> Result<()> {
-        self.blocks -= 1;
-        if self.blocks == 0 {
+    fn pass_on(&mut self, Ended { number, coded }: Ended) -> Result<()> {
+        self.blocks.remove(&number);
+        if self.blocks.is_empty() {
             self.busy += self.began.elapsed();
         }
-        let coded = ended.unwrap_or_else(|panic| resume_unwind(panic))?;
+        let coded = coded.unwrap_or_else(|panic| resume_unwind(panic))?;
         self.is_over |= self.out.send(coded).is_err();
         Ok(())
     }
 }
 
-/// Tasks have senders, and so has the stage.
+/// The tasks and the stage hold senders.
 const OPEN: &str = "a sender that is in scope";
 
 /// Encodes some blocks of a window on all threads.
