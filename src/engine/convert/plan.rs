@@ -260,10 +260,9 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     // The blocks above and two lists of blocks that wait; vectors grow to twice their length.
     let spool = if tiers > 0 { 3 * 2 * SPOOLED } else { 0 };
     let needs = |room: &Room| {
-        // The samples of blocks in flight and of one that is gathered; the codes of as many, of those that overtook one, and of two that
-        // are written.
+        // The samples of blocks in flight and of one that is gathered; the codes of as many, and of those that overtook one.
         let waiting = if room.flight > 1 { room.flight } else { 0 };
-        (2 * room.flight + waiting + 3) * raw
+        2 * (room.flight + 1) * raw + waiting * raw
             + threads(room) * scratch
             + room.kept_above * above
             + spool
