@@ -262,7 +262,8 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let needs = |room: &Room| {
         // The samples of blocks in flight and of one that is gathered; the codes of as many, and of those that overtook one.
         let waiting = if room.flight > 1 { room.flight } else { 0 };
-        2 * (room.flight + 1) * raw + waiting * raw
+        2 * (room.flight + 1) * raw
+            + waiting * raw
             + threads(room) * scratch
             + room.kept_above * above
             + spool
