@@ -49,9 +49,13 @@ impl CodeBox {
 
     /// Whether every place fits in 32 bits.
     pub(crate) fn fits(&self) -> bool {
-        let along = |a: usize| self.extents[a].saturating_sub(1).saturating_mul(self.strides[a]);
-        let last = (0..3).fold(self.first, |sum, a| sum.saturating_add(along(a)));
-        u32::try_from(last).is_ok()
+        let [x, y, z, _] = self.extents.map(|extent| extent.saturating_sub(1));
+        u32::try_from(self.place_after(self.first, [x, y, z])).is_ok()
+    }
+
+    /// The place so many codes after another along x, y, z, or the largest number.
+    pub(crate) fn place_after(&self, place: usize, codes: [usize; 3]) -> usize {
+        self.strides.iter().zip(codes).fold(place, |place, (stride, n)| place.saturating_add(stride.saturating_mul(n)))
     }
 }
 

@@ -47,7 +47,7 @@ pub(super) fn offsets(strides: [u32; 3]) -> Box<Offsets> {
 
 /// The symbol of a nonzero code. Writes the value's low bits, if any.
 pub(super) fn symbol(code: i32, bits: &mut BitWriter) -> u8 {
-    let value = (((code << 1) ^ (code >> 31)) as u32).wrapping_sub(1);
+    let value = value(code);
     if value < LONG {
         return value as u8;
     }
@@ -65,9 +65,14 @@ pub(super) fn in_order(codes: [i32; 8], significant: u8) -> [i32; 8] {
 /// The symbols of nonzero codes, if none has low bits.
 #[inline(always)]
 pub(super) fn short_symbols(codes: &[i32; 8]) -> Option<[u8; 8]> {
-    let values = codes.map(|code| (((code << 1) ^ (code >> 31)) as u32).wrapping_sub(1));
+    let values = codes.map(value);
     let are_short = values.iter().fold(0, |any, value| any | value) < LONG;
     are_short.then(|| values.map(|value| value as u8))
+}
+
+/// Maps -1, 1, -2, ... to 0, 1, 2, ...
+fn value(code: i32) -> u32 {
+    (((code << 1) ^ (code >> 31)) as u32).wrapping_sub(1)
 }
 
 /// Maps 1, 2, 3, ... to -1, 1, -2, ...

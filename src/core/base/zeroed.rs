@@ -23,7 +23,7 @@ impl<T: Pod> Zeroed<T> {
         Self::in_pages(len, true)
     }
 
-    /// A buffer of `len` zeros of which little will be written. Small pages take memory only where they are written.
+    /// A buffer of `len` zeros in small pages. If its user writes little, it takes little memory.
     pub fn in_small_pages(len: usize) -> Self {
         Self::in_pages(len, false)
     }

@@ -29,6 +29,11 @@ impl<'a> BoxSamples<'a> {
         Self::new(ty, bytes, size, size)
     }
 
+    /// Voxels of the box along x, y, z.
+    pub(super) fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
     /// The number of voxels in the box.
     pub(super) fn voxels(&self) -> usize {
         self.size.iter().product()
@@ -85,7 +90,7 @@ impl<'a> BoxSamples<'a> {
         }
     }
 
-    /// The largest magnitude of the samples, none of which is missing.
+    /// The largest magnitude. No sample may be missing.
     pub(super) fn magnitude(&self) -> f64 {
         let mut largest = 0.0;
         self.for_each_run(|_, values| largest = dispatch!(larger(values, largest)));

@@ -23,7 +23,7 @@ impl<T: Pooled> Buffer<T> {
         Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::new(len), len, false))
     }
 
-    /// Creates a slice of which few entries will be used: a spare one, or fresh memory in small pages, which goes back to the system.
+    /// Creates a slice for a user of few entries. It is a spare one, or fresh memory in small pages that later goes back to the system.
     pub fn for_part(len: usize) -> Self {
         Self::take_spare(len).unwrap_or_else(|| Self::new(Zeroed::in_small_pages(len), len, true))
     }

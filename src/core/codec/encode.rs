@@ -63,10 +63,10 @@ impl Encoder {
         let extended = of.extended(codec, around, samples);
         let missing_around = Missing::find(codec, &extended);
         let outer = BoxSamples::whole(codec.sample, &extended, around);
-        let outer = Source { codec, size: around, samples: outer, missing: &missing_around };
+        let outer = Source { codec, samples: outer, missing: &missing_around };
         let samples = &BoxSamples::new(codec.sample, &extended, around, size);
         let missing = Missing::within(codec, samples, &missing_around);
-        let block = Source { codec, size, samples: *samples, missing: &missing };
+        let block = Source { codec, samples: *samples, missing: &missing };
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
@@ -82,7 +82,7 @@ impl Encoder {
             Some(coded) => self.coded_parts(codec, size, &coded)?,
             None => self.exact_parts(codec, samples, &missing, None)?,
         };
-        let Parts { stats, share, mut parts } = self.smaller(codec, size, samples, &missing, coded)?;
+        let Parts { stats, share, mut parts } = self.smaller(codec, samples, &missing, coded)?;
         if missing.count > 0 {
             pack_missing(missing.mask(), &missing.samples(samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
@@ -106,7 +106,7 @@ impl Encoder {
         let samples = of.coarse(codec, samples);
         let missing = Missing::find(codec, &samples);
         let samples = BoxSamples::whole(codec.sample, &samples, of.size);
-        let source = Source { codec, size: of.size, samples, missing: &missing };
+        let source = Source { codec, samples, missing: &missing };
         let Some(pyramid) = &codec.scheme.pyramid else { return Ok(self.uncoded(codec, id, size, above)) };
         let (mut single, mut double) = (Buffer::default(), Buffer::default());
         let coded = match pyramid.single {
@@ -240,7 +240,6 @@ impl Encoder {
     fn smaller(
         &mut self,
         codec: &WindowCodec,
-        size: [usize; 3],
         samples: &BoxSamples<'_>,
         missing: &Missing,
         coded: Parts,
@@ -251,7 +250,7 @@ impl Encoder {
         {
             best = best.or(self.exact_parts(codec, samples, missing, None)?);
         }
-        if let Some(listed) = listed(codec, size, samples, best.bytes()) {
+        if let Some(listed) = listed(codec, samples, best.bytes()) {
             best = best.or(self.exact_parts(codec, samples, missing, Some(&listed))?);
         }
         Ok(best)
@@ -277,13 +276,9 @@ struct Parts {
     parts: Vec<EncodedPart>,
 }
 
-/// The samples of a block of some voxels by their values, if the file may list them and that may take less than `bytes`.
-pub(super) fn listed(
-    codec: &WindowCodec,
-    [x, y, z]: [usize; 3],
-    samples: &BoxSamples<'_>,
-    bytes: usize,
-) -> Option<Listed> {
+/// The samples of a block by their values, if the file may list them and that may take less than `bytes`.
+pub(super) fn listed(codec: &WindowCodec, samples: &BoxSamples<'_>, bytes: usize) -> Option<Listed> {
+    let [x, y, z] = samples.size();
     let may_pay = codec.lists && may_be_smaller(samples, bytes);
     may_pay.then(|| Listed::new(&samples.contiguous(), codec.sample.size(), [x, y, z, codec.frames()])).flatten()
 }

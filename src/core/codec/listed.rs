@@ -2,7 +2,8 @@
 
 use super::box_samples::BoxSamples;
 
-/// Whether a list of the values of a block's samples may take less than `bytes`. Takes the entropy of a few samples, as if a sample either equals that of the frame before or is independent of it.
+/// Whether a list of the values of a block's samples may take less than `bytes`. Takes the entropy of a few samples, as if a sample
+/// either equals that of the frame before or is independent of it.
 pub(super) fn may_be_smaller(samples: &BoxSamples<'_>, bytes: usize) -> bool {
     let (count, voxels, sample) = (samples.len(), samples.voxels(), |at: usize| samples.sample(at));
     let starts = (0..RUNS).map(|run| run * count / RUNS);

@@ -89,14 +89,7 @@ pub(super) fn load_group(
 /// Loads the samples of `count` of a block's `voxels` voxels, beginning with `first`: one lane for each frame. Unused
 /// elements of lanes are zero.
 pub fn load_lanes(codec: &WindowCodec, samples: &[u8], first: usize, count: usize, voxels: usize, out: &mut [Lane]) {
-    let size = codec.sample.size();
-    if count == LANES {
-        return sample::load_strided(codec.sample, &samples[first * size..], voxels, out);
-    }
-    for (lane, frame) in out.iter_mut().zip(samples.chunks_exact(voxels * size)) {
-        *lane = Lane::default();
-        sample::load(codec.sample, &frame[first * size..][..count * size], &mut lane[..count]);
-    }
+    BoxSamples::whole(codec.sample, samples, [voxels, 1, 1]).load_lanes(first, count, out);
 }
 
 fn fill(source: &mut [Lane], weight: &[Lane], lane: usize) {

@@ -81,15 +81,13 @@ impl<R: Real> SourceNodes<R> {
 #[derive(Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) codec: &'a WindowCodec,
-    /// The number of voxels along x, y, z.
-    pub(super) size: [usize; 3],
     pub(super) samples: BoxSamples<'a>,
     pub(super) missing: &'a Missing,
 }
 
 impl Source<'_> {
     pub(super) fn voxels(&self) -> usize {
-        self.size.iter().product()
+        self.samples.voxels()
     }
 
     /// Encodes the block, which covers `size` voxels, by a pyramid, from the samples of `outer`, which also has nodes that only
@@ -118,7 +116,7 @@ impl Source<'_> {
         let source = outer.load(&weighing);
         let encode = |step, field: &mut [R], codes: &mut [i32]| {
             let marked = source.marked(passes.negligible(step));
-            let nodes = Nodes { values: &source.values, size: outer.size, marked: Some(&marked) };
+            let nodes = Nodes { values: &source.values, size: outer.samples.size(), marked: Some(&marked) };
             passes.encode(step, nodes, known, field, codes).then_some(())
         };
         encode(step, field, codes)?;

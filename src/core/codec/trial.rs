@@ -34,7 +34,7 @@ impl<'a, R: Real> Trial<'a, R> {
         let missing = Missing::within(codec, &own, &around);
         let weighing = QuantizerSetup::new(codec, &own, missing.magnitude);
         let extended = BoxSamples::whole(codec.sample, &samples, outer);
-        let extended = Source { codec, size: outer, samples: extended, missing: &around };
+        let extended = Source { codec, samples: extended, missing: &around };
         let nodes = weighing.as_ref().map(|weighing| extended.load(weighing)).unwrap_or_default();
         Self { size, samples, missing, weighing, nodes, outer }
     }
@@ -62,13 +62,13 @@ impl<'a, R: Real> Trial<'a, R> {
 
     /// About the bytes of the box by its list of values; none if it may not be listed, or if that takes no less than `bytes`.
     pub fn listed_bytes(&self, codec: &WindowCodec, bytes: usize) -> Option<usize> {
-        let listed = listed(codec, self.size, &self.own(codec), bytes)?;
+        let listed = listed(codec, &self.own(codec), bytes)?;
         Some(listed.estimate(&mut Vec::new())).filter(|listed| *listed < bytes)
     }
 
     /// As [`Self::bytes`]; none if the box must be stored exactly.
     fn coded(&self, codec: &WindowCodec, pyramid: &Pyramid) -> Option<usize> {
-        let source = Source { codec, size: self.size, samples: self.own(codec), missing: &self.missing };
+        let source = Source { codec, samples: self.own(codec), missing: &self.missing };
         let weighing = self.weighing.as_ref()?;
         let step = source.step::<R>(pyramid, weighing)?;
         let passes = codec.passes(pyramid, self.size);

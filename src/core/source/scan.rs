@@ -108,7 +108,7 @@ pub fn scan_frame(
             let mut bytes = BYTES.take();
             bytes.resize(run.voxels() * ty.size(), 0);
             window.read_box(frame, &run, &mut bytes)?;
-            let found = scan_run(&bytes, ty, declared, &seen.extremes, [frame, (z * ny + y) * nx]);
+            let found = scan_run(&bytes, ty, declared, &seen.extremes, frame, (z * ny + y) * nx);
             BYTES.set(bytes);
             Ok(found)
         })
@@ -122,7 +122,8 @@ fn scan_run(
     ty: SampleType,
     declared: Option<f64>,
     seen: &ExtremeCounts,
-    [frame, at]: [usize; 2],
+    frame: usize,
+    at: usize,
 ) -> Scan {
     let mut seen = Scan { digest: xxh3_64_with_seed(bytes, 0), extremes: seen.none_beside(), ..Scan::NOTHING };
     let (mut range, mut extremes) = (seen.range, seen.extremes);

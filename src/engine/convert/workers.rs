@@ -56,7 +56,7 @@ pub(super) fn encode(
             scope.spawn(move |_| {
                 let coded = catch_unwind(AssertUnwindSafe(|| encode_next(level, plan, encoders, &window, block)));
                 let coded = coded.map(|coded| Ok(CodedBlock { window, coded: coded? }));
-                let _ = ended.send(Ended { number, coded }); // after an error nobody receives
+                let _ = ended.send(Ended { number, coded }); // fails if the stage has returned with an error
             });
         }
         flight.land()?;

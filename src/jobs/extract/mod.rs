@@ -290,7 +290,7 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// The blocks that need whole blocks above. Blocks of which a tiny part is decoded alone do not.
+    /// The blocks that need whole blocks above: all but those of which only a tiny part is decoded.
     fn sharing<'e>(
         &self,
         codec: &WindowCodec,

@@ -184,8 +184,8 @@ proptest! {
             prop_assert_eq!(pairs(&listed), expected.clone());
             let some = pairs(&some.1);
             prop_assert!(some.iter().all(|pair| expected.contains(pair)));
-            let is_needed = |(place, _): &(u32, i32)| (needed.start..needed.end).contains(&(*place as usize));
-            prop_assert!(expected.iter().filter(|pair| is_needed(pair)).all(|pair| some.contains(pair)));
+            let is_needed = |place: u32| (needed.start..needed.end).contains(&(place as usize));
+            prop_assert!(expected.iter().filter(|pair| is_needed(pair.0)).all(|pair| some.contains(pair)));
         }
         let other = CodeBox { allowed: 0, ..at };
         prop_assert_eq!(Packing::Nested.unpack(&raw, &[other], &mut found).is_ok(), count == 0);

@@ -173,9 +173,7 @@ fn zeros_ahead(around: &[u8], symbols: &[u8], next: usize) -> usize {
 
 /// Whether some codes of a row of cells may be needed; its first code has the place `start`.
 fn is_needed(start: usize, of: &CodeBox) -> bool {
-    let along = |axis: usize, codes: usize| of.strides[axis].saturating_mul(codes);
-    let last = start.saturating_add(along(0, of.extents[0]).saturating_add(along(1, 1)).saturating_add(along(2, 1)));
-    start < of.needed.end && of.needed.start <= last
+    start < of.needed.end && of.needed.start <= of.place_after(start, [of.extents[0], 1, 1])
 }
 
 /// Whether the cells of a row are zero where codes lie outside of the box or belong to another one.

@@ -30,6 +30,7 @@
 
 mod corrections;
 mod detail;
+mod encode;
 mod known;
 mod refine;
 mod stages;
@@ -47,10 +48,9 @@ use super::rows::{self, Change, add_changes, add_changes_to_zero, count_nonzero}
 use crate::base::grid::Region;
 use crate::base::vectors::dispatch;
 use crate::wavelet;
-use corrections::{Decoding, Encoding};
+use corrections::Decoding;
 use known::KnownNodes;
 pub(crate) use known::Nodes;
-use refine::gather;
 use stages::{Stages, Step};
 use std::ops::Range;
 use wavesplat_format::{
@@ -343,55 +343,6 @@ impl<'a> PredictionPasses<'a> {
         self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
     }
 
-    /// Nodes of smaller magnitude get codes of zero, if they are predicted to be zero.
-    pub(crate) fn negligible<R: Real>(&self, step: f64) -> R {
-        let steps = self.passes.iter().map(|pass| self.pyramid.step(step, pass.level));
-        R::from_f64(LESS_THAN_HALF * steps.fold(step, f64::min))
-    }
-
-    /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed.
-    /// NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass. Where neither the source nor
-    /// known nodes mark a k, its codes are zero, and its nodes in the field arbitrary.
-    pub(crate) fn encode<R: Real>(
-        &self,
-        step: f64,
-        source: Nodes<'_, R>,
-        known: Option<Nodes<'_, R>>,
-        field: &mut [R],
-        codes: &mut [i32],
-    ) -> bool {
-        let mut fits = true;
-        let ranges: Vec<_> = (0..self.pyramids).map(|number| self.code_ranges(number)).collect();
-        let mut split = Buffer::with_len(self.codes() / self.pyramids);
-        let sources = source.values.chunks_exact(source.size.iter().product::<usize>() * self.shape[3]);
-        let fields = field.chunks_exact_mut(self.pyramid_nodes());
-        for (number, ((nodes, values), ranges)) in fields.zip(sources).zip(&ranges).enumerate() {
-            let ks = || self.ks(number);
-            if !ks().any(|k| source.has(k)) && known.is_none_or(|known| known.is_zero(ks())) {
-                apart(codes, ranges).into_iter().for_each(|codes| codes.fill(0));
-                continue;
-            }
-            self.split(values, source.size, &mut split);
-            let (codes, known) = (apart(codes, ranges), known.map(|known| self.known(number, known)));
-            let mut encoding = Encoding { split: &split, codes, passes: self.inverses(step), known, fits: true };
-            self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);
-            fits &= encoding.fits;
-        }
-        fits
-    }
-
-    /// Sorts the source's nodes of a pyramid by the passes that add them.
-    fn split<R: Real>(&self, source: &[R], size: [usize; 3], split: &mut [R]) {
-        let mut rest = split;
-        for pass in &self.passes {
-            let (added, after) = std::mem::take(&mut rest).split_at_mut(pass.codes());
-            if !added.is_empty() {
-                dispatch!(gather(source, size, pass, added));
-            }
-            rest = after;
-        }
-    }
-
     /// The level parts with a code that is not zero.
     pub(crate) fn coded(&self, codes: &SparseCodes) -> [bool; PARTS] {
         std::array::from_fn(|part| self.count(part as u8, codes) > 0)
@@ -465,18 +416,6 @@ impl<'a> PredictionPasses<'a> {
         self.shape.iter().product()
     }
 
-    /// For each pass its first node in a pyramid's nodes pass after pass, its step and the inverse of that.
-    fn inverses<R: Real>(&self, step: f64) -> Vec<(usize, [R; 2])> {
-        let mut start = 0;
-        let of_pass = |pass: &Pass| {
-            let step = self.pyramid.step(step, pass.level);
-            let first = start;
-            start += pass.codes();
-            (first, [R::from_f64(step), R::from_f64(1.0 / step)])
-        };
-        self.passes.iter().map(of_pass).collect()
-    }
-
     /// The range of codes of each pass of a pyramid.
     fn code_ranges(&self, number: usize) -> Vec<Range<usize>> {
         let mut start = 0;
@@ -493,18 +432,4 @@ impl<'a> PredictionPasses<'a> {
     fn runs(&self) -> Vec<Range<usize>> {
         wavelet::ranges(&self.boxes.iter().map(|of| of.at.extents[3]).collect::<Vec<_>>())
     }
-}
-
-/// Less than half, so that products with a rounded inverse of a step are, too.
-const LESS_THAN_HALF: f64 = 0.499;
-
-/// The parts of a slice at ascending ranges.
-fn apart<'a>(codes: &'a mut [i32], ranges: &[Range<usize>]) -> Vec<&'a mut [i32]> {
-    let (mut rest, mut start) = (codes, 0);
-    let part = |range: &Range<usize>| {
-        let (part, after) = std::mem::take(&mut rest)[range.start - start..].split_at_mut(range.len());
-        (rest, start) = (after, range.end);
-        part
-    };
-    ranges.iter().map(part).collect()
 }
