@@ -267,9 +267,12 @@ impl DecodedBlocks {
         self.kept().put(key, Decoded::Values(values.clone()), values.bytes(), self.room);
     }
 
-    /// Keeps samples if there is room.
+    /// Keeps samples if there is room, in a copy if their buffer is more than twice as long.
     pub(super) fn keep_samples(&self, key: DecodedKey, samples: &Arc<Buffer<u8>>) {
-        self.kept().put(key, Decoded::Samples(samples.clone()), samples.held_bytes(), self.room);
+        let is_wasteful = samples.held_bytes() > 2 * samples.len();
+        let samples = if is_wasteful { Arc::new(Buffer::to_keep(samples)) } else { samples.clone() };
+        let bytes = samples.held_bytes();
+        self.kept().put(key, Decoded::Samples(samples), bytes, self.room);
     }
 }
 
