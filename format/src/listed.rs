@@ -40,13 +40,18 @@ pub struct Listed {
 }
 
 impl Listed {
-    /// The samples of a box, little-endian, with `extents` along x, y, z, t. None if they have more than [`MAX_LISTED`] values, or if
-    /// there are none.
-    pub fn new(samples: &[u8], size: usize, extents: [usize; 4]) -> Option<Self> {
-        let mut found: HashMap<u64, u16> = HashMap::new();
+    /// The samples of a box, little-endian, with `extents` along x, y, z, t, in runs one after another. None if they have more than
+    /// `most` or [`MAX_LISTED`] values, or if there are none.
+    pub fn new<'a>(
+        runs: impl IntoIterator<Item = &'a [u8]>,
+        size: usize,
+        extents: [usize; 4],
+        most: usize,
+    ) -> Option<Self> {
+        let (most, mut found) = (most.min(MAX_LISTED), HashMap::<u64, u16>::new());
         let mut recent = [None; RECENT];
-        let mut places = Vec::with_capacity(samples.len() / size);
-        for value in samples.chunks_exact(size).map(number) {
+        let mut places = Vec::with_capacity(extents.iter().product());
+        for value in runs.into_iter().flat_map(|run| run.chunks_exact(size)).map(number) {
             let slot = &mut recent[(value.wrapping_mul(SPREADS) >> 54) as usize];
             let place = match *slot {
                 Some((known, place)) if known == value => place,
@@ -55,7 +60,7 @@ impl Listed {
                     *found.entry(value).or_insert(next as u16)
                 }
             };
-            if found.len() > MAX_LISTED {
+            if found.len() > most {
                 return None;
             }
             *slot = Some((value, place));
@@ -239,7 +244,7 @@ mod tests {
 
     #[test]
     fn values_have_the_documented_bytes() {
-        let listed = Listed::new(&[7, 7, 9, 7], 1, [2, 1, 1, 2]).expect("two values");
+        let listed = Listed::new([&[7, 7, 9, 7][..]], 1, [2, 1, 1, 2], MAX_LISTED).expect("two values");
         let head = [2, 0, 0, 0, 0, 0, 0, 0, 7, 9];
         let cells = [2, 0, 0, 0, 0, 1, 0, 0, 0, 0x18, 0, 1, 1];
         assert_eq!(packed(&listed), [&head[..], &cells].concat());
@@ -249,15 +254,16 @@ mod tests {
     fn many_values_are_not_listed() {
         let all: Vec<u8> = (0..=u16::MAX).flat_map(u16::to_le_bytes).collect();
         let extents = [256, 16, 16, 1];
-        let listed = Listed::new(&all, 2, extents).expect("all values of 16 bits");
+        let listed = Listed::new([&all[..]], 2, extents, MAX_LISTED).expect("all values of 16 bits");
         assert_eq!(unpack_listed(&packed(&listed), 2, extents).expect("packed"), all);
         let more: Vec<u8> = (0..=u32::from(u16::MAX) + 1).flat_map(u32::to_le_bytes).collect();
-        assert_eq!(Listed::new(&more, 4, [65537, 1, 1, 1]), None);
+        assert_eq!(Listed::new([&more[..]], 4, [65537, 1, 1, 1], usize::MAX), None);
+        assert_eq!(Listed::new([&[7, 7, 9, 7][..]], 1, [2, 1, 1, 2], 1), None);
     }
 
     #[test]
     fn hostile_lists_are_refused() {
-        let good = packed(&Listed::new(&[7, 7, 9, 7], 1, [2, 1, 1, 2]).expect("two values"));
+        let good = packed(&Listed::new([&[7, 7, 9, 7][..]], 1, [2, 1, 1, 2], MAX_LISTED).expect("two values"));
         let change = |at: usize, byte: u8| {
             let mut raw = good.clone();
             raw[at] = byte;
@@ -285,7 +291,7 @@ mod tests {
             let total = extents.iter().product::<usize>() as u64;
             let value = |i: u64| values[((i / run as u64).wrapping_mul(seed) >> 7) as usize % values.len()];
             let samples: Vec<u8> = (0..total).flat_map(|i| value(i).to_le_bytes().into_iter().take(size)).collect();
-            let listed = Listed::new(&samples, size, extents).expect("few values");
+            let listed = Listed::new(samples.chunks(size * run), size, extents, MAX_LISTED).expect("few values");
             let raw = packed(&listed);
             prop_assert!(raw.len() <= max_listed(size, extents));
             prop_assert_eq!(&unpack_listed(&raw, size, extents).expect("packed"), &samples);

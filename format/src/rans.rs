@@ -172,30 +172,47 @@ fn encode_lanes<const N: usize>(symbols: &[u8], frequencies: &Frequencies, bits:
         start += u32::from(frequencies[symbol]);
         Encode::new(frequencies[symbol], start - u32::from(frequencies[symbol]), bits)
     });
-    let mut words = Vec::with_capacity(symbols.len() / 2);
+    let mut words = Words { words: vec![0; symbols.len() + 1], first: symbols.len() };
     let mut states = [LOWEST; N];
     let (rounds, tail) = symbols.as_chunks::<N>();
     for (state, &symbol) in states.iter_mut().zip(tail).rev() {
-        push(state, &table[usize::from(symbol)], bits, &mut words);
+        *state = words.push(*state, &table[usize::from(symbol)], bits);
     }
     for round in rounds.iter().rev() {
         for (state, &symbol) in states.iter_mut().zip(round).rev() {
-            push(state, &table[usize::from(symbol)], bits, &mut words);
+            *state = words.push(*state, &table[usize::from(symbol)], bits);
         }
     }
+    let words = words.all();
     crate::bits::put_varint(words.len(), out);
     out.extend(states.iter().flat_map(|state| state.to_le_bytes()));
-    out.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
+    out.extend(words.iter().flat_map(|word| word.to_le_bytes()));
 }
 
-/// Codes a symbol (eq 40), after the state has given up 16 bits if it would overflow.
-fn push(state: &mut u32, symbol: &Encode, bits: u32, words: &mut Vec<u16>) {
-    if *state >= symbol.limit {
-        words.push(*state as u16);
-        *state >>= 16;
+/// Words that states gave up, from the last to the first. A symbol makes a state give up one at most.
+struct Words {
+    words: Vec<u16>,
+    /// The place before the last one.
+    first: usize,
+}
+
+impl Words {
+    /// The state that a symbol is packed in (eq 40), after `state` has given up 16 bits if it would overflow. Without branches, because a
+    /// processor could not predict them.
+    #[inline(always)]
+    fn push(&mut self, state: u32, symbol: &Encode, bits: u32) -> u32 {
+        self.words[self.first] = state as u16;
+        let is_large = state >= symbol.limit;
+        self.first -= usize::from(is_large);
+        let state = if is_large { state >> 16 } else { state };
+        let quotient = (u64::from(state).wrapping_mul(symbol.reciprocal) >> (32 + bits)) as u32;
+        state.wrapping_add(quotient.wrapping_mul(symbol.others)).wrapping_add(symbol.start)
     }
-    let quotient = (u64::from(*state).wrapping_mul(symbol.reciprocal) >> (32 + bits)) as u32;
-    *state = state.wrapping_add(quotient.wrapping_mul(symbol.others)).wrapping_add(symbol.start);
+
+    /// All of them, the first one first.
+    fn all(&self) -> &[u16] {
+        &self.words[self.first + 1..]
+    }
 }
 
 /// Reads what [`encode`] appended and fills `symbols`.

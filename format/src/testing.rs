@@ -144,7 +144,7 @@ pub(crate) fn encode(
     }
     if let Some(samples) = &content.exact {
         let mut raw = Vec::new();
-        let kind = match Listed::new(samples, size, geometry.extents())
+        let kind = match Listed::new([&samples[..]], size, geometry.extents(), usize::MAX)
             .filter(|_| geometry.window.pyramid.is_some() && samples[0] % 2 == 0)
         {
             Some(listed) => {

@@ -90,10 +90,16 @@ impl<'a> BoxSamples<'a> {
         }
     }
 
-    /// The largest magnitude. No sample may be missing.
-    pub(super) fn magnitude(&self) -> f64 {
-        let mut largest = 0.0;
-        self.for_each_run(|_, values| largest = dispatch!(larger(values, largest)));
+    /// The largest magnitude, which is at most `limit`. No sample may be missing.
+    pub(super) fn magnitude(&self, limit: f64) -> f64 {
+        let (mut values, mut largest) = (vec![0.0; self.size[0]], 0.0);
+        for row in self.rows() {
+            sample::load(self.ty, row, &mut values);
+            largest = dispatch!(larger(&values[..], largest));
+            if largest >= limit {
+                break;
+            }
+        }
         largest
     }
 
@@ -113,6 +119,22 @@ impl<'a> BoxSamples<'a> {
         }
     }
 
+    /// Loads the series of `count` voxels, beginning with `first`, as 32-bit floats: one row for each frame. Leaves the rest of rows
+    /// as it is.
+    pub(super) fn load_singles<const N: usize>(&self, first: usize, count: usize, out: &mut [[f32; N]]) {
+        let (each, stride) = (self.ty.size(), self.of.iter().product::<usize>());
+        let mut at = 0;
+        while at < count {
+            let (voxel, row) = (first + at, if self.is_whole() { self.voxels() } else { self.size[0] });
+            let (start, len) = (self.place(0, voxel), (row - voxel % row).min(count - at));
+            for (frame, out) in out.iter_mut().enumerate() {
+                let bytes = &self.bytes[(start + frame * stride) * each..][..len * each];
+                sample::load_as(self.ty, bytes, &mut out[at..at + len], |v| v as f32);
+            }
+            at += len;
+        }
+    }
+
     /// The number of a sample in the array.
     fn place(&self, frame: usize, voxel: usize) -> usize {
         let ([nx, ny, nz], [x, y, _]) = (self.of, self.size);
@@ -120,7 +142,7 @@ impl<'a> BoxSamples<'a> {
     }
 
     /// The rows along x.
-    fn rows(&self) -> impl Iterator<Item = &'a [u8]> {
+    pub(super) fn rows(&self) -> impl Iterator<Item = &'a [u8]> {
         let ([x, y, z], each, me) = (self.size, self.ty.size(), *self);
         let starts = (0..self.frames()).flat_map(move |t| (0..y * z).map(move |row| me.place(t, row * x)));
         starts.map(move |start| &me.bytes[start * each..][..x * each])
@@ -171,7 +193,8 @@ mod tests {
             };
             assert_eq!(runs(&some), runs(&whole));
             let all = values_of(&copy);
-            assert_eq!(some.magnitude(), all.iter().fold(0.0, |most: f64, v| most.max(v.abs())));
+            let largest = all.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+            assert_eq!([some.magnitude(largest), some.magnitude(f64::INFINITY)], [largest; 2]);
             assert!((0..some.len()).all(|index| some.sample(index) == whole.sample(index)));
             for (first, count) in crate::codec::lane_groups(some.voxels()) {
                 let lanes = |of: &BoxSamples<'_>| {
@@ -180,6 +203,10 @@ mod tests {
                     lanes
                 };
                 assert_eq!(lanes(&some), lanes(&whole), "{size:?} {first}");
+                let mut singles = vec![[f32::NAN; LANES]; frames];
+                some.load_singles(first, count, &mut singles);
+                let all_lanes = lanes(&some);
+                assert!((0..frames).all(|t| (0..count).all(|l| f64::from(singles[t][l]) == all_lanes[t][l])));
                 let expected = |t: usize, l: usize| {
                     let (v, [x, y, _]) = (first + l, size);
                     values[v % x + of[0] * (v / x % y + of[1] * (v / (x * y) + of[2] * t))]

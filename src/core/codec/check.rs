@@ -2,10 +2,9 @@
 
 use super::WindowCodec;
 use super::box_samples::BoxSamples;
-use super::buffer::clear;
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
-use crate::codec::bound::Bound;
+use crate::codec::bound::{Bound, Measure, share};
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::Outliers;
 
@@ -16,6 +15,23 @@ pub(super) struct Compared<'a> {
     pub(super) source: &'a [Lane],
     /// The decoded samples.
     pub(super) decoded: &'a [Lane],
+}
+
+impl Compared<'_> {
+    fn sample(&self, codec: &WindowCodec, t: usize, lane: usize) -> ComparedSample {
+        let (decoded, source) = (self.decoded[t][lane], self.source[t][lane]);
+        let extracted = sample::round_to(codec.sample, decoded);
+        let error = codec.error(decoded, extracted, source);
+        ComparedSample { source, extracted, error, allowed: codec.bound.allowed(source) }
+    }
+}
+
+/// A sample, what is extracted of it, and its error, rounded up.
+struct ComparedSample {
+    source: f64,
+    extracted: f64,
+    error: f64,
+    allowed: f64,
 }
 
 /// The errors and the range of decoded samples, and those that miss the bound.
@@ -29,17 +45,26 @@ pub(super) struct Tally {
     pub(super) share: f64,
     /// The indices of samples that must be stored exactly.
     pub(super) outliers: Vec<u32>,
-    /// The present samples of one series: frame and index.
-    present: Vec<(usize, usize)>,
-    /// Their errors, and those allowed.
-    errors: Vec<(f64, f64)>,
+    /// Scratch: for each sample of some series, not a number if it may miss the bound.
+    is_clear: Vec<Lane>,
+}
+
+/// What holds for some series without missing samples.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ranges {
+    /// No error is larger.
+    pub(super) largest: f64,
+    /// Decoded samples are neither less nor more.
+    pub(super) lo: f64,
+    pub(super) hi: f64,
+    /// About the sum of squared errors.
+    pub(super) squares: f64,
 }
 
 impl Tally {
     pub(super) fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
-        let (outliers, present, errors) = Default::default();
-        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers, present, errors }
+        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers: Vec::new(), is_clear: Vec::new() }
     }
 
     pub(super) fn add(&mut self, decoded: f64, error: f64) {
@@ -47,6 +72,18 @@ impl Tally {
         self.max = self.max.max(decoded);
         self.reached = self.reached.max(error);
         self.squared_error += error * error;
+    }
+
+    /// Adds series if they change only the sum of squared errors: their errors and samples lie in the ranges of those before. Returns
+    /// whether it did.
+    pub(super) fn add_within(&mut self, series: &Ranges, declared: Option<f64>) -> bool {
+        let Ranges { largest, lo, hi, squares } = *series;
+        let may_be_missing = declared.is_some_and(|v| lo <= v && v <= hi);
+        let changes_nothing = largest <= self.reached && self.min <= lo && hi <= self.max && !may_be_missing;
+        if changes_nothing {
+            self.squared_error += squares;
+        }
+        changes_nothing
     }
 
     /// Adds `count` series; `whole` means that none of their samples is missing. `index(frame, lane)` is the index of a
@@ -59,9 +96,60 @@ impl Tally {
         whole: bool,
         index: impl Fn(usize, usize) -> Option<usize>,
     ) {
+        if whole && codec.bound.bound == Bound::Pointwise {
+            return self.add_by_sample(codec, compared, count, index);
+        }
         let clear = if whole { self.add_clearly_within(codec, compared, count) } else { [false; LANES] };
         let unclear = (0..count).filter(|l| !clear[*l]);
         unclear.for_each(|lane| self.add_one(codec, compared, lane, |t| index(t, lane)));
+    }
+
+    /// Adds `count` series without missing samples under [`Bound::Pointwise`]. Vector code adds samples that are clearly within the bound, and
+    /// rounds their errors up once at the end.
+    fn add_by_sample(
+        &mut self,
+        codec: &WindowCodec,
+        compared: &Compared<'_>,
+        count: usize,
+        index: impl Fn(usize, usize) -> Option<usize>,
+    ) {
+        let mut is_clear = std::mem::take(&mut self.is_clear);
+        is_clear.resize(compared.source.len(), Lane::default());
+        let stats = LaneStats::of_clear_samples(codec, compared, &mut is_clear);
+        for lane in 0..count {
+            self.add_lane(codec, &stats, lane, compared.source.len());
+            if stats.missing[lane].is_nan() {
+                let unclear = (0..is_clear.len()).filter(|t| is_clear[*t][lane].is_nan());
+                unclear.for_each(|t| self.add_unclear(codec, compared, t, lane, &index));
+            }
+        }
+        self.is_clear = is_clear;
+    }
+
+    /// Adds a sample that may miss the bound.
+    fn add_unclear(
+        &mut self,
+        codec: &WindowCodec,
+        compared: &Compared<'_>,
+        t: usize,
+        lane: usize,
+        index: &impl Fn(usize, usize) -> Option<usize>,
+    ) {
+        let of = compared.sample(codec, t, lane);
+        if let Some(index) = index(t, lane)
+            && self.add_unless_outlier(index, &of, false)
+        {
+            self.share = self.share.max(share(of.error, of.allowed).min(1.0));
+        }
+    }
+
+    /// Adds the statistics of samples that are clearly within the bound.
+    fn add_lane(&mut self, codec: &WindowCodec, stats: &LaneStats, lane: usize, frames: usize) {
+        let largest = if stats.largest[lane] > 0.0 { stats.largest[lane].next_up() } else { 0.0 };
+        self.reached = self.reached.max(largest);
+        self.share = self.share.max(codec.bound.largest_share(&[stats.sums[lane]], frames));
+        self.squared_error += stats.squares[lane];
+        (self.min, self.max) = (self.min.min(stats.lo[lane]), self.max.max(stats.hi[lane]));
     }
 
     /// Adds those of the first `count` series that are clearly within the bound and have no missing sample. This is
@@ -73,11 +161,7 @@ impl Tally {
             let share = codec.bound.largest_share(&[stats.sums[l]], compared.source.len());
             let clear = l < count && share <= 1.0 && !stats.missing[l].is_nan();
             if clear {
-                let largest = if stats.largest[l] > 0.0 { stats.largest[l].next_up() } else { 0.0 };
-                self.reached = self.reached.max(largest);
-                self.share = self.share.max(share);
-                self.squared_error += stats.squares[l];
-                (self.min, self.max) = (self.min.min(stats.lo[l]), self.max.max(stats.hi[l]));
+                self.add_lane(codec, &stats, l, compared.source.len());
             }
             clear
         })
@@ -91,35 +175,44 @@ impl Tally {
         lane: usize,
         index: impl Fn(usize) -> Option<usize>,
     ) {
-        let error = |t: usize| {
-            let (decoded, source) = (compared.decoded[t][lane], compared.source[t][lane]);
-            let rounded = sample::round_to(codec.sample, decoded);
-            (codec.error(decoded, rounded, source), codec.bound.allowed(source))
-        };
-        let (mut present, mut errors) = (std::mem::take(&mut self.present), std::mem::take(&mut self.errors));
-        clear(&mut present).extend((0..compared.source.len()).filter_map(|t| Some((t, index(t)?))));
-        clear(&mut errors).extend(present.iter().map(|(t, _)| error(*t)));
-        let holds = codec.bound.holds(errors.iter().copied());
-        for ((t, index), (error, allowed)) in present.iter().zip(&mut errors) {
-            if holds || *error <= *allowed {
-                self.add(sample::round_to(codec.sample, compared.decoded[*t][lane]), *error);
-            } else {
-                *error = 0.0;
-                self.add(compared.source[*t][lane], 0.0);
-                self.outliers.push(*index as u32);
+        let present = (0..compared.source.len()).filter_map(|t| Some((index(t)?, compared.sample(codec, t, lane))));
+        let share = match codec.bound.measure() {
+            Measure::Largest => {
+                let kept = present.filter(|(index, of)| self.add_unless_outlier(*index, of, false));
+                kept.map(|(_, of)| share(of.error, of.allowed)).fold(0.0, f64::max)
             }
-        }
-        let share = codec.bound.share(errors.iter().copied());
+            Measure::RootMeanSquare => {
+                let mut present: Vec<_> = present.collect();
+                let holds = codec.bound.holds(present.iter().map(|(_, of)| (of.error, of.allowed)));
+                for (index, of) in &mut present {
+                    if !self.add_unless_outlier(*index, of, holds) {
+                        of.error = 0.0;
+                    }
+                }
+                codec.bound.share(present.iter().map(|(_, of)| (of.error, of.allowed)))
+            }
+        };
         self.share = self.share.max(share.min(1.0)); // rounding up may exceed 1 although the bound holds
-        (self.present, self.errors) = (present, errors);
     }
 
+    /// Adds a sample of a series whose bound `holds`, or that is within the bound itself; or notes an outlier. Returns whether it is none.
+    fn add_unless_outlier(&mut self, index: usize, of: &ComparedSample, holds: bool) -> bool {
+        let is_within = holds || of.error <= of.allowed;
+        if is_within {
+            self.add(of.extracted, of.error);
+        } else {
+            self.add(of.source, 0.0);
+            self.outliers.push(index as u32);
+        }
+        is_within
+    }
     /// Takes the samples that must be stored exactly.
     pub(super) fn take_outliers(&mut self, samples: &BoxSamples<'_>) -> Outliers {
         let mut positions = std::mem::take(&mut self.outliers);
         positions.sort_unstable();
-        let samples = positions.iter().flat_map(|position| samples.sample(*position as usize)).copied().collect();
-        Outliers { positions, samples }
+        let mut bytes = Vec::new();
+        positions.iter().for_each(|position| bytes.extend_from_slice(samples.sample(*position as usize)));
+        Outliers { positions, samples: bytes }
     }
 }
 
@@ -137,21 +230,27 @@ struct LaneStats {
 }
 
 impl LaneStats {
-    fn new(codec: &WindowCodec, compared: &Compared<'_>) -> Self {
+    /// Those of the samples that are clearly within [`Bound::Pointwise`]. Others make [`Self::missing`] and their element of `is_clear`
+    /// not a number.
+    fn of_clear_samples(codec: &WindowCodec, compared: &Compared<'_>, is_clear: &mut [Lane]) -> Self {
         let mut stats = Self::empty();
-        let declared = codec.missing_value.unwrap_or(f64::NAN); // NaN equals no value
-        match (codec.sample, codec.bound.bound) {
-            (SampleType::F32, Bound::Pointwise) => dispatch!(compare_singles(&mut stats, compared, declared)),
-            (SampleType::F64, Bound::Pointwise) => dispatch!(compare_doubles(&mut stats, compared, declared)),
-            _ => return Self::under_any_bound(codec, compared, declared),
+        let limits = [codec.bound.delta.next_down().next_down(), codec.missing_value.unwrap_or(f64::NAN)]; // NaN equals no value
+        match codec.sample {
+            SampleType::F32 => dispatch!(compare_singles(&mut stats, compared, limits, is_clear)),
+            SampleType::F64 => dispatch!(compare_doubles(&mut stats, compared, limits, is_clear)),
+            ty => {
+                for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
+                    stats.add_clear(decoded, &sample::round_all(ty, decoded), source, limits, is_clear);
+                }
+            }
         }
         stats.sums = stats.largest;
         stats
     }
 
-    /// The general version for any type and bound; slower than the vector code for floats.
-    fn under_any_bound(codec: &WindowCodec, compared: &Compared<'_>, declared: f64) -> Self {
-        let mut stats = Self::empty();
+    /// Those of all samples under any bound.
+    fn new(codec: &WindowCodec, compared: &Compared<'_>) -> Self {
+        let (mut stats, declared) = (Self::empty(), codec.missing_value.unwrap_or(f64::NAN)); // NaN equals no value
         for (decoded, source) in compared.decoded.iter().zip(compared.source) {
             let errors = stats.add(decoded, &sample::round_all(codec.sample, decoded), source, declared);
             codec.bound.add(&errors, source, &mut stats.sums);
@@ -163,6 +262,23 @@ impl LaneStats {
         let zero = Lane::default();
         let (lo, hi) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
         Self { lo, hi, missing: zero, largest: zero, squares: zero, sums: zero }
+    }
+
+    /// Adds the samples of a frame whose errors are at most the first of `limits`, and that do not equal the second.
+    #[inline(always)]
+    fn add_clear(&mut self, decoded: &Lane, rounded: &Lane, source: &Lane, limits: [f64; 2], is_clear: &mut Lane) {
+        for l in 0..LANES {
+            let (a, b, v) = ((decoded[l] - source[l]).abs(), (rounded[l] - source[l]).abs(), rounded[l]);
+            let e = if a > b { a } else { b };
+            let clear = (a <= limits[0]) & (b <= limits[0]) & (v.abs() < f64::INFINITY) & (v != limits[1]);
+            let (e, lo, hi) = if clear { (e, v, v) } else { (0.0, f64::INFINITY, f64::NEG_INFINITY) };
+            self.largest[l] = if e > self.largest[l] { e } else { self.largest[l] };
+            self.squares[l] += e * e;
+            self.lo[l] = if lo < self.lo[l] { lo } else { self.lo[l] };
+            self.hi[l] = if hi > self.hi[l] { hi } else { self.hi[l] };
+            is_clear[l] = if clear { 0.0 } else { f64::NAN };
+            self.missing[l] += is_clear[l];
+        }
     }
 
     /// Adds a frame; returns its errors.
@@ -184,17 +300,17 @@ impl LaneStats {
 }
 
 #[inline(always)]
-fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
-    for (decoded, source) in compared.decoded.iter().zip(compared.source) {
+fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, limits: [f64; 2], is_clear: &mut [Lane]) {
+    for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
-        stats.add(decoded, &rounded, source, declared);
+        stats.add_clear(decoded, &rounded, source, limits, is_clear);
     }
 }
 
 #[inline(always)]
-fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, declared: f64) {
-    for (decoded, source) in compared.decoded.iter().zip(compared.source) {
-        stats.add(decoded, decoded, source, declared);
+fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, limits: [f64; 2], is_clear: &mut [Lane]) {
+    for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
+        stats.add_clear(decoded, decoded, source, limits, is_clear);
     }
 }
 
@@ -206,21 +322,30 @@ mod tests {
     use crate::wavelet::Basis;
 
     #[test]
-    fn vector_code_agrees_with_the_general_code() {
+    fn vector_code_agrees_with_samples_one_by_one() {
+        let (frames, delta): (usize, f64) = (40, 3.0);
         let number = |i: usize| ((i * 7919) % 1013) as f64 / 7.0 - 50.0;
-        let lanes = |first: usize| (0..40).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();
-        let (source, mut decoded): (Vec<Lane>, Vec<Lane>) = (lanes(0), lanes(5));
+        let lanes =
+            |first: usize| (0..frames).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();
+        let source: Vec<Lane> = lanes(0);
+        let mut decoded = source.clone();
+        for (i, v) in decoded.iter_mut().flatten().enumerate() {
+            let errors = [0.1, delta.next_down(), delta, delta.next_up(), 2.9, 40.0];
+            *v += errors[i % 61 % 6] * if i % 3 == 0 { -1.0 } else { 1.0 };
+        }
         (decoded[3][1], decoded[9][4], decoded[20][6]) = (f64::NAN, -9.5, f64::INFINITY);
-        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 3.0 };
-        for ty in [SampleType::F32, SampleType::F64] {
-            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), 40, ty, bound, 8);
+        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta };
+        for (ty, count) in [(SampleType::F32, LANES), (SampleType::F64, 7), (SampleType::I16, LANES)] {
+            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, ty, bound, 8);
             codec.missing_value = Some(-9.5);
             let compared = Compared { source: &source, decoded: &decoded };
-            let bit = |v: f64| if v.is_nan() { u64::MAX } else { v.to_bits() };
-            let bits = |s: LaneStats| [s.lo, s.hi, s.missing, s.largest, s.squares, s.sums].map(|lane| lane.map(bit));
-            let (fast, slow) = (LaneStats::new(&codec, &compared), LaneStats::under_any_bound(&codec, &compared, -9.5));
-            assert!([1, 4, 6].into_iter().all(|l| fast.missing[l].is_nan()));
-            assert_eq!(bits(fast), bits(slow), "{ty}");
+            let (mut fast, mut slow) = (Tally::new(), Tally::new());
+            fast.add_series(&codec, &compared, count, true, |t, l| Some(t * LANES + l));
+            (0..count).for_each(|l| slow.add_one(&codec, &compared, l, |t| Some(t * LANES + l)));
+            assert!(slow.outliers.len() > frames && slow.outliers.contains(&(9 * LANES as u32 + 4)), "{ty}");
+            assert_eq!((&fast.outliers, fast.min, fast.max), (&slow.outliers, slow.min, slow.max), "{ty}");
+            assert_eq!((fast.reached, fast.share), (slow.reached, slow.share), "{ty}");
+            assert!((fast.squared_error - slow.squared_error).abs() <= 1e-9 * slow.squared_error, "{ty}");
         }
     }
 }

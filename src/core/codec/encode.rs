@@ -280,7 +280,8 @@ struct Parts {
 pub(super) fn listed(codec: &WindowCodec, samples: &BoxSamples<'_>, bytes: usize) -> Option<Listed> {
     let [x, y, z] = samples.size();
     let may_pay = codec.lists && may_be_smaller(samples, bytes);
-    may_pay.then(|| Listed::new(&samples.contiguous(), codec.sample.size(), [x, y, z, codec.frames()])).flatten()
+    let extents = [x, y, z, codec.frames()];
+    may_pay.then(|| Listed::new(samples.rows(), codec.sample.size(), extents, bytes)).flatten() // a value takes a byte
 }
 
 impl Parts {

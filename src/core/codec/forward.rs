@@ -47,9 +47,9 @@ fn keep_largest<R: Real>(sums: &[[R; VOXELS]], largest: &mut [R]) {
     }
 }
 
-/// The sums of products of some voxels, from the first frame to the last.
+/// The sums of products of some voxels, from the first factor of each row to the last.
 #[inline(always)]
-fn products<R: Real>(rows: &[Vec<R>], samples: &[[R; VOXELS]], sums: &mut [[R; VOXELS]]) {
+pub(super) fn products<R: Real>(rows: &[Vec<R>], samples: &[[R; VOXELS]], sums: &mut [[R; VOXELS]]) {
     let (some, last) = rows.as_chunks::<SIDE_BY_SIDE>();
     let (some_sums, last_sums) = sums.as_chunks_mut::<SIDE_BY_SIDE>();
     for (rows, sums) in some.iter().zip(some_sums) {
@@ -86,7 +86,7 @@ fn products_of<R: Real, const N: usize>(
 }
 
 /// Voxels whose samples in 32 frames stay in the first-level cache.
-const VOXELS: usize = 128;
+pub(super) const VOXELS: usize = 128;
 
 /// Voxels whose sums stay in registers.
 const WIDTH: usize = 16;

@@ -27,6 +27,7 @@ mod repack;
 mod rows;
 pub mod block_with_ghosts;
 pub mod scheme;
+mod screen;
 pub mod trial;
 mod truncate;
 

@@ -32,6 +32,9 @@ pub trait Real:
     /// The whole number n (below 2^31 for `f64`, 2^22 for `f32`) from the sum n + [`Self::BIG`], by the sum's low bits.
     /// A general conversion to an integer would not compile to vector code.
     fn less_big(self) -> i32;
+
+    /// The values, if they are 32-bit floats.
+    fn singles(values: &[Self]) -> Option<&[f32]>;
 }
 
 impl Real for f32 {
@@ -58,6 +61,10 @@ impl Real for f32 {
     fn less_big(self) -> i32 {
         self.to_bits().wrapping_sub(Self::BIG.to_bits()) as i32
     }
+
+    fn singles(values: &[Self]) -> Option<&[f32]> {
+        Some(values)
+    }
 }
 
 impl Real for f64 {
@@ -83,5 +90,9 @@ impl Real for f64 {
 
     fn less_big(self) -> i32 {
         self.to_bits().wrapping_sub(Self::BIG.to_bits()) as i32
+    }
+
+    fn singles(_: &[Self]) -> Option<&[f32]> {
+        None
     }
 }

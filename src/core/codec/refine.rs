@@ -14,6 +14,7 @@ use super::load::{Missing, load_group};
 use super::pyramid::{Nodes, PredictionPasses};
 use super::real::Real;
 use super::rows::count_nonzero;
+use super::screen::{self, Screen};
 use super::truncate::Group;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample;
@@ -179,8 +180,8 @@ impl Source<'_> {
         let marked = passes.marked_codes(codes, known);
         let tally = match self.plain() {
             _ if self.codec.tier > 0 => Some(Tally::new()), // its samples are stored with the blocks below
-            true => self.check_samples(field),
-            false => self.check_series(weighing, field, &marked),
+            true if !Screen::applies::<R>(self) => self.check_samples(field),
+            _ => self.check_series(weighing, field, &marked),
         };
         Checked { marked, tally }
     }
@@ -269,10 +270,19 @@ impl Source<'_> {
     /// Compares series with the decoded field. None if too many samples miss the bound.
     fn check_series<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> Option<Tally> {
         let used = Used::new(self.codec.basis.as_ref(), marked);
+        let mut screen = Screen::new(self, field, &used);
         let (mut tally, mut group) = (Tally::new(), Group::new(self.codec));
-        for (first, count) in lane_groups(self.voxels()) {
-            self.decode_group(weighing, field, &used, first, count, &mut group);
-            self.check(&group, first, count, &mut tally)?;
+        for first in (0..self.voxels()).step_by(screen::RUN) {
+            let run = screen::RUN.min(self.voxels() - first);
+            screen.iter_mut().for_each(|screen| screen.compare(first, run));
+            for (at, count) in lane_groups(run) {
+                let ranges = screen.as_ref().map(|screen| screen.ranges(at, count));
+                if ranges.is_some_and(|ranges| tally.add_within(&ranges, self.codec.missing_value)) {
+                    continue;
+                }
+                self.decode_group(weighing, field, &used, first + at, count, &mut group);
+                self.check(&group, first + at, count, &mut tally)?;
+            }
         }
         Some(tally)
     }

@@ -8,34 +8,21 @@
 //! nodes.
 
 use super::learn::learned_functions;
-use super::smoothness::{AXES, roughest_first};
-use super::spread::evenly;
+use super::smoothness::roughest_first;
+use super::trial_boxes::{BoxSizes, Sampled};
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::grid::Region;
-use wavesplat_core::base::sample::{self, SampleType};
-use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
+use wavesplat_core::base::sample;
 use wavesplat_core::codec::bound::{ErrorBound, Measure};
 use wavesplat_core::codec::real::Real;
 use wavesplat_core::codec::scheme::{Axis, Pyramid, Scheme, Stencil};
 use wavesplat_core::codec::trial::Trial;
 use wavesplat_core::codec::{self, WindowCodec};
-use wavesplat_core::source::{Archive, FrameWindow, read_frames};
+use wavesplat_core::source::{Archive, FrameWindow};
 use wavesplat_core::wavelet::Basis;
 use wavesplat_format::Packing;
-
-/// The largest number of samples in all boxes, for blocks of `block` samples.
-pub(super) fn most_samples(block: usize) -> usize {
-    (5 * block / 4).max(FEW_SAMPLES)
-}
-
-/// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
-/// trial. A node takes `each` bytes.
-pub(super) fn bytes(block: usize, sample: SampleType, each: usize) -> usize {
-    most_samples(block) * (sample.size() + 2 * (each + 1) + each + size_of::<i32>())
-}
 
 /// The inputs of a choice.
 pub(super) struct SchemeSelector<'a> {
@@ -46,7 +33,7 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) promise: ErrorBound,
     /// The largest absolute sample of the window.
     pub(super) magnitude: f64,
-    /// [`most_samples`]
+    /// [`most_samples`](super::trial_boxes::most_samples)
     pub(super) most: usize,
     /// Voxels a side of the file's blocks.
     pub(super) edge: usize,
@@ -60,20 +47,22 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) before: Option<&'a Scheme>,
 }
 
-/// A box of samples, frame by frame.
-struct Sampled {
-    size: BlockWithGhosts,
-    /// The voxels that pyramids may use.
-    outer: [usize; 3],
-    samples: Vec<u8>,
-}
-
 /// A transform along time, and the transformed boxes.
 struct Transformed<'a, R: Real> {
     /// For the scheme that is tried now: making the functions of a long window takes longer than a trial.
     codec: Mutex<WindowCodec>,
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
+}
+
+/// A scheme that was tried.
+#[derive(Clone)]
+struct Tried {
+    scheme: Scheme,
+    /// The estimated bytes of the window.
+    bytes: f64,
+    /// The estimated bytes of each box.
+    of_boxes: Vec<usize>,
 }
 
 impl SchemeSelector<'_> {
@@ -107,50 +96,86 @@ impl SchemeSelector<'_> {
     }
 
     fn smallest_of<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
-        let boxes = self.boxes()?;
+        let boxes = self.boxes(BoxSizes::Small)?;
         let families = self.families(&self.order(&boxes))?;
         let (mut learned, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|f| f.basis == Basis::Learned);
         let mut trials = self.transformed::<R>(&others, &boxes);
         let others: Vec<_> = others.into_iter().map(|scheme| self.tried(scheme, &trials)).collect();
         // Making long functions orthonormal takes a time of the cube of their length: only if they can win.
-        let least = others.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
+        let least = others.iter().map(|tried| tried.bytes).fold(f64::INFINITY, f64::min);
         learned.retain(|scheme| bytes_of_functions(scheme) < least);
         trials.extend(self.transformed(&learned, &boxes));
         let learned = learned.into_iter().map(|scheme| self.tried(scheme, &trials));
         let families: Vec<_> = learned.chain(others).collect();
-        let least = families.iter().map(|f| f.0).fold(f64::INFINITY, f64::min);
-        let promising = families.into_iter().filter(|f| f.0 <= least * PROMISING);
+        let least = families.iter().map(|tried| tried.bytes).fold(f64::INFINITY, f64::min);
+        let promising = families.into_iter().filter(|tried| tried.bytes <= least * PROMISING);
         if let Some(before) = self.before {
             let best = promising.clone().reduce(fewer);
-            if let Some((_, scheme)) = best.filter(|best| best.1.basis == before.basis) {
-                return Ok(self.finished(scheme, trials));
+            if let Some(best) = best.filter(|best| best.scheme.basis == before.basis) {
+                let is_listed = self.is_listed(&best, &trials);
+                return Ok(self.finished(best.scheme, is_listed, trials));
             }
         }
-        let tuned = promising.map(|f| self.coarsest(f, &trials));
+        let tuned = promising.map(|tried| self.coarsest(tried, &trials));
         let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
-        let variants = [Self::orders, Self::stencils, Self::growths, Self::ghosts, Self::linear_orders];
-        for variants in variants {
-            let others = variants(self, &best.1).into_iter().map(|scheme| self.tried(scheme, &trials));
-            best = others.reduce(fewer).filter(|other| other.0 < best.0 * CLEARLY).unwrap_or(best);
+        for variants in [Self::orders, Self::stencils, Self::growths, Self::linear_orders] {
+            best = self.or_variants(best, variants, &trials);
         }
-        Ok(self.finished(best.1, trials))
+        let is_listed = self.is_listed(&best, &trials);
+        trials.retain(|of| of.basis == best.scheme.basis);
+        let scheme = self.with_or_without_ghosts(best, &trials)?;
+        Ok(self.finished(scheme, is_listed, trials))
+    }
+
+    /// A scheme, or one of its variants that is clearly smaller.
+    fn or_variants<R: Real + Send + Sync>(
+        &self,
+        best: Tried,
+        variants: fn(&Self, &Scheme) -> Vec<Scheme>,
+        trials: &[Transformed<'_, R>],
+    ) -> Tried {
+        let others = variants(self, &best.scheme).into_iter().map(|scheme| self.tried(scheme, trials));
+        others.reduce(fewer).filter(|other| other.bytes < best.bytes * CLEARLY).unwrap_or(best)
+    }
+
+    /// A scheme with or without ghost nodes. Of small boxes, these are a larger share of the nodes than of blocks. So if small ones are
+    /// smaller without, large ones decide.
+    fn with_or_without_ghosts<R: Real + Send + Sync>(
+        &self,
+        best: Tried,
+        trials: &[Transformed<'_, R>],
+    ) -> Result<Scheme> {
+        let of_small = self.or_variants(best.clone(), Self::ghosts, trials).scheme;
+        let sizes = [BoxSizes::Small, BoxSizes::Large].map(|sizes| self.box_size(sizes));
+        if of_small == best.scheme || sizes[0] == sizes[1] {
+            return Ok(of_small);
+        }
+        let boxes = self.boxes(BoxSizes::Large)?;
+        let trials = self.transformed::<R>(std::slice::from_ref(&best.scheme), &boxes);
+        Ok(self.or_variants(self.tried(best.scheme, &trials), Self::ghosts, &trials).scheme)
     }
 
     /// Whether most samples take less by lists of their values than by a scheme: then no blocks are above others.
-    fn is_listed<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &[Transformed<'_, R>]) -> bool {
-        let of_basis = trials.iter().find(|b| b.basis == scheme.basis);
-        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return false };
-        let codec = self.with_scheme(scheme, of_basis);
-        let is_listed = |b: &&Trial<'_, R>| b.listed_bytes(&codec, b.bytes(&codec, pyramid)).is_some();
-        let listed: usize = of_basis.boxes.iter().filter(is_listed).map(Trial::voxels).sum();
-        2 * listed > of_basis.boxes.iter().map(Trial::voxels).sum()
+    fn is_listed<R: Real + Send + Sync>(&self, tried: &Tried, trials: &[Transformed<'_, R>]) -> bool {
+        let Some(of_basis) = trials.iter().find(|b| b.basis == tried.scheme.basis).filter(|_| self.lists) else {
+            return false;
+        };
+        let codec = self.with_scheme(&tried.scheme, of_basis);
+        let boxes = || of_basis.boxes.iter().zip(&tried.of_boxes);
+        let listed = boxes().filter(|(of_box, bytes)| of_box.listed_bytes(&codec, **bytes).is_some());
+        2 * listed.map(|(of_box, _)| of_box.voxels()).sum::<usize>() > boxes().map(|(of_box, _)| of_box.voxels()).sum()
     }
 
     /// The codec of the chosen scheme.
-    fn finished<R: Real + Send + Sync>(&self, mut scheme: Scheme, trials: Vec<Transformed<'_, R>>) -> WindowCodec {
+    fn finished<R: Real + Send + Sync>(
+        &self,
+        mut scheme: Scheme,
+        is_listed: bool,
+        trials: Vec<Transformed<'_, R>>,
+    ) -> WindowCodec {
         let is_in_space = scheme.pyramid.as_ref().is_some_and(|p| p.order.iter().any(|axis| *axis != Axis::T));
-        let has_tiers = self.tiers > 0 && is_in_space && !(self.lists && self.is_listed(&scheme, &trials));
-        scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = if has_tiers { self.tiers } else { 0 });
+        let tiers = if is_in_space && !is_listed { self.tiers } else { 0 };
+        scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = tiers);
         let of_basis = trials.into_iter().find(|b| b.basis == scheme.basis);
         match of_basis {
             Some(of_basis) => {
@@ -180,77 +205,42 @@ impl SchemeSelector<'_> {
     }
 
     /// The scheme with the step that makes the boxes smallest. A coarseness of exactly 1 stays.
-    fn coarsest<R: Real + Send + Sync>(&self, first: (f64, Scheme), trials: &[Transformed<'_, R>]) -> (f64, Scheme) {
-        if first.1.coarseness == 1.0 {
+    fn coarsest<R: Real + Send + Sync>(&self, first: Tried, trials: &[Transformed<'_, R>]) -> Tried {
+        if first.scheme.coarseness == 1.0 {
             return first;
         }
         let coarser = self.while_smaller(&first, COARSER, trials);
-        if coarser.0 < first.0 { coarser } else { self.while_smaller(&first, 1.0 / COARSER, trials) }
+        if coarser.bytes < first.bytes { coarser } else { self.while_smaller(&first, 1.0 / COARSER, trials) }
     }
 
-    fn while_smaller<R: Real + Send + Sync>(
-        &self,
-        first: &(f64, Scheme),
-        factor: f64,
-        trials: &[Transformed<'_, R>],
-    ) -> (f64, Scheme) {
+    fn while_smaller<R: Real + Send + Sync>(&self, first: &Tried, factor: f64, trials: &[Transformed<'_, R>]) -> Tried {
         let mut best = first.clone();
         loop {
-            let scheme = Scheme { coarseness: best.1.coarseness * factor, ..best.1.clone() };
+            let scheme = Scheme { coarseness: best.scheme.coarseness * factor, ..best.scheme.clone() };
             let next = self.tried(scheme, trials);
-            if next.0 >= best.0 {
+            if next.bytes >= best.bytes {
                 return best;
             }
             best = next;
         }
     }
 
-    /// A scheme with its estimated bytes of the window.
-    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &[Transformed<'_, R>]) -> (f64, Scheme) {
-        (self.bytes(&scheme, trials), scheme)
+    /// A scheme with its estimated bytes.
+    fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &[Transformed<'_, R>]) -> Tried {
+        let of_basis = trials.iter().find(|b| b.basis == scheme.basis);
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else {
+            return Tried { scheme, bytes: f64::INFINITY, of_boxes: Vec::new() };
+        };
+        let codec = &*self.with_scheme(&scheme, of_basis);
+        let of_boxes: Vec<usize> = of_basis.boxes.par_iter().map(|b| b.bytes(codec, pyramid)).collect();
+        let voxels = of_basis.boxes.iter().map(Trial::voxels).sum::<usize>() as f64;
+        let bytes = of_boxes.iter().sum::<usize>() as f64 * self.voxels() as f64 / voxels + bytes_of_functions(&scheme);
+        Tried { scheme, bytes, of_boxes }
     }
 
     /// The number of frames in the window.
-    fn frames(&self) -> usize {
+    pub(super) fn frames(&self) -> usize {
         self.channels[0].frames()
-    }
-
-    /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
-    /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
-    fn boxes(&self) -> Result<Vec<Sampled>> {
-        let dims = self.archive.grid.dims;
-        let voxels = dims.iter().product::<usize>() * self.channels.len();
-        let least = LEAST_BOXES.max(self.channels.len());
-        // Double precision takes more memory.
-        let most = if self.single() { self.most } else { self.most / 3 * 2 };
-        let most = (voxels / LARGEST_SHARE).min(most / self.frames());
-        let volume = |size: &[usize; 3]| size.iter().product::<usize>();
-        let size = EDGES.map(|edge| dims.map(|n| n.min(edge)));
-        let size = size.into_iter().find(|size| least * volume(size) <= most).unwrap_or([1; 3]);
-        let count = (voxels / SHARE / volume(&size)).clamp(least, MOST_BOXES).min(most / volume(&size)).max(1);
-        (0..count).map(|i| self.sampled(i, size)).collect()
-    }
-
-    /// Reads the box with this number. Its position is one of an evenly spread sequence, the same for every window;
-    /// channels take turns.
-    fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
-        let dims = self.archive.grid.dims;
-        // Blocks at far faces are followed by no other voxels. They are taken for every second box.
-        let outer = self.outer_size(size);
-        let ends = if number.is_multiple_of(2) { size } else { outer };
-        let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
-        let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
-        let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
-        let size = BlockWithGhosts { size, known };
-        let window = self.channels[number % self.channels.len()];
-        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
-        Ok(Sampled { size, outer, samples })
-    }
-
-    /// The voxels that coding a box by any pyramid takes.
-    fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
-        let ghosts = self.pyramid(&AXES, Stencil::Cubic).ghost_nodes(size);
-        std::array::from_fn(|axis| size[axis] + ghosts[axis])
     }
 
     /// The axes from the roughest to the smoothest.
@@ -325,7 +315,7 @@ impl SchemeSelector<'_> {
         Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))
     }
 
-    fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
+    pub(super) fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
         let ((growth, most), ghosts) = (GROWTHS[0], self.packing == Packing::Nested);
         Pyramid {
             order: order.to_vec(),
@@ -340,7 +330,7 @@ impl SchemeSelector<'_> {
     }
 
     /// Whether 32-bit floats are precise enough.
-    fn single(&self) -> bool {
+    pub(super) fn single(&self) -> bool {
         let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&self.promise.delta) && self.magnitude < MOST_SINGLE;
         normal && self.promise.delta >= self.magnitude * SINGLE
     }
@@ -400,17 +390,6 @@ impl SchemeSelector<'_> {
         variants(best, other)
     }
 
-    /// Estimates the bytes of the window.
-    fn bytes<R: Real + Send + Sync>(&self, scheme: &Scheme, trials: &[Transformed<'_, R>]) -> f64 {
-        let of_basis = trials.iter().find(|b| b.basis == scheme.basis);
-        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else { return f64::INFINITY };
-        let codec = &*self.with_scheme(scheme, of_basis);
-        let bytes = |b: &Trial<'_, R>| (b.bytes(codec, pyramid), b.voxels());
-        let (bytes, voxels) = of_basis.boxes.par_iter().map(bytes).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        let whole = self.archive.grid.dims.iter().product::<usize>() * self.channels.len();
-        bytes as f64 * whole as f64 / voxels as f64 + bytes_of_functions(scheme)
-    }
-
     /// The codec of a scheme with the same functions as those of a transform along time.
     fn with_scheme<'a, R: Real>(
         &self,
@@ -437,30 +416,14 @@ fn bytes_of_functions(scheme: &Scheme) -> f64 {
 }
 
 /// The scheme with fewer bytes; the first if equal.
-fn fewer(a: (f64, Scheme), b: (f64, Scheme)) -> (f64, Scheme) {
-    if b.0 < a.0 { b } else { a }
+fn fewer(a: Tried, b: Tried) -> Tried {
+    if b.bytes < a.bytes { b } else { a }
 }
 
 fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme> {
     let pyramids = best.pyramid.as_ref().map(of).unwrap_or_default();
     pyramids.into_iter().map(|pyramid| Scheme { pyramid: Some(pyramid), ..best.clone() }).collect()
 }
-
-/// The number of samples that may always be read.
-const FEW_SAMPLES: usize = 1 << 17;
-
-/// The edges of boxes for trials, in voxels: multiples of eight have coarse lattices like those of blocks.
-const EDGES: [usize; 8] = [40, 32, 24, 16, 8, 4, 2, 1];
-
-/// One voxel in this many is used for trials.
-const SHARE: usize = 50;
-
-/// The smallest and the largest number of boxes for trials.
-const LEAST_BOXES: usize = 2;
-const MOST_BOXES: usize = 12;
-
-/// At most one voxel in this many is used for trials.
-const LARGEST_SHARE: usize = 8;
 
 /// The number of rows that functions are learned from, and the number of the first position.
 const ROWS: usize = 64;

@@ -1,9 +1,10 @@
 //! The reader stage: reads windows of frames and sends blocks.
 
-use super::choose::{SchemeSelector, most_samples};
+use super::choose::SchemeSelector;
 use super::coarse::CoarseBlocks;
 use super::coded_input::{BRIGHTNESS, CodedInput};
 use super::sampled::{self, Pixel};
+use super::trial_boxes::most_samples;
 use super::warnings::{self, Fill, Findings};
 use super::{ConvertConfig, MissingPolicy, Plan, WindowJob, WindowsDone};
 use crossbeam_channel::Sender;

@@ -36,6 +36,7 @@ pub mod shard;
 mod smoothness;
 mod spread;
 mod to_file;
+mod trial_boxes;
 mod variation;
 mod warnings;
 mod workers;

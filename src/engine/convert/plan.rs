@@ -1,7 +1,7 @@
 //! Decisions made from the configuration and the archive before any frame is read.
 
 use super::coded_input::CodedInput;
-use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, choose, settings};
+use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, settings, trial_boxes};
 use crate::file::above::{most_within, nodes_above};
 use crate::file::promise::UNIT_RANGE;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
@@ -252,7 +252,7 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let has_pyramids = config.has_pyramids();
     let field = if has_pyramids { 2 * voxels * most_coefficients(config) * each } else { 0 };
     let above = if tiers > 0 { nodes_above(blocks) * most_coefficients(config) * each } else { 0 };
-    let choice = if has_pyramids { choose::bytes(samples, sample, each) } else { 0 };
+    let choice = if has_pyramids { trial_boxes::bytes(samples, sample, each) } else { 0 };
     let workers = rayon::current_num_threads();
     let threads = |room: &Room| room.flight.min(workers);
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces

@@ -53,7 +53,7 @@ fn listed(raw: &[u8], extents: [usize; 4]) {
 }
 
 fn listed_round_trip(samples: &[u8], size: usize, extents: [usize; 4]) {
-    let listed = Listed::new(samples, size, extents).expect("few values");
+    let listed = Listed::new([samples], size, extents, usize::MAX).expect("few values");
     let (mut codes, mut raw) = (Vec::new(), Vec::new());
     listed.pack(&mut codes, &mut raw);
     assert_eq!(unpack_listed(&raw, size, extents).expect("packed"), samples);

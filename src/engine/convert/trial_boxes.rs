@@ -1,0 +1,117 @@
+//! Boxes of a window's samples in which schemes are tried.
+
+use super::choose::SchemeSelector;
+use super::smoothness::AXES;
+use super::spread::evenly;
+use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
+use wavesplat_core::codec::scheme::Stencil;
+use wavesplat_core::source::read_frames;
+
+/// The largest number of samples in all boxes, for blocks of `block` samples.
+pub(super) fn most_samples(block: usize) -> usize {
+    (5 * block / 4).max(FEW_SAMPLES)
+}
+
+/// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
+/// trial. A node takes `each` bytes. Large boxes with one transform fit beside small ones.
+pub(super) fn bytes(block: usize, sample: SampleType, each: usize) -> usize {
+    most_samples(block) * (sample.size() + 2 * (each + 1) + each + size_of::<i32>())
+}
+
+/// A box of samples, frame by frame.
+pub(super) struct Sampled {
+    pub(super) size: BlockWithGhosts,
+    /// The voxels that pyramids may use.
+    pub(super) outer: [usize; 3],
+    pub(super) samples: Vec<u8>,
+}
+
+/// How large boxes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BoxSizes {
+    /// Large enough to compare transforms and steps.
+    Small,
+    /// Nearly as large as blocks.
+    Large,
+}
+
+impl BoxSizes {
+    /// Edges in voxels, the best one first: multiples of eight have coarse lattices like those of blocks.
+    fn edges(self) -> &'static [usize] {
+        let all = &[40, 32, 24, 16, 8, 4, 2, 1];
+        if self == Self::Small { &all[2..] } else { all }
+    }
+}
+
+impl SchemeSelector<'_> {
+    /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
+    /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
+    pub(super) fn boxes(&self, sizes: BoxSizes) -> Result<Vec<Sampled>> {
+        let size = self.box_size(sizes);
+        let volume = size.iter().product::<usize>();
+        let count = (self.voxels() / SHARE / volume).clamp(self.least_boxes(), MOST_BOXES);
+        let count = count.min(self.most_voxels(sizes) / volume).max(1);
+        (0..count).map(|i| self.sampled(i, size)).collect()
+    }
+
+    /// Voxels of a box along x, y, z.
+    pub(super) fn box_size(&self, sizes: BoxSizes) -> [usize; 3] {
+        let (most, least) = (self.most_voxels(sizes), self.least_boxes());
+        let sizes = sizes.edges().iter().map(|edge| self.archive.grid.dims.map(|n| n.min(*edge)));
+        sizes.into_iter().find(|size| least * size.iter().product::<usize>() <= most).unwrap_or([1; 3])
+    }
+
+    /// Voxels of all channels.
+    pub(super) fn voxels(&self) -> usize {
+        self.archive.grid.whole().voxels() * self.channels.len()
+    }
+
+    fn least_boxes(&self) -> usize {
+        LEAST_BOXES.max(self.channels.len())
+    }
+
+    /// The most voxels of all boxes.
+    fn most_voxels(&self, sizes: BoxSizes) -> usize {
+        let most = if self.single() { self.most } else { self.most / 3 * 2 }; // double precision takes more memory
+        let most = if sizes == BoxSizes::Small { most / 3 } else { most };
+        (self.voxels() / LARGEST_SHARE).min(most / self.frames())
+    }
+
+    /// Reads the box with this number. Its position is one of an evenly spread sequence, the same for every window;
+    /// channels take turns.
+    pub(super) fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
+        let dims = self.archive.grid.dims;
+        // Blocks at far faces are followed by no other voxels. They are taken for every second box.
+        let outer = self.outer_size(size);
+        let ends = if number.is_multiple_of(2) { size } else { outer };
+        let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
+        let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
+        let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
+        let size = BlockWithGhosts { size, known };
+        let window = self.channels[number % self.channels.len()];
+        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
+        Ok(Sampled { size, outer, samples })
+    }
+
+    /// The voxels that coding a box by any pyramid takes.
+    fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
+        let ghosts = self.pyramid(&AXES, Stencil::Cubic).ghost_nodes(size);
+        std::array::from_fn(|axis| size[axis] + ghosts[axis])
+    }
+}
+
+/// The number of samples that may always be read.
+const FEW_SAMPLES: usize = 1 << 17;
+
+/// One voxel in this many is used for trials.
+const SHARE: usize = 50;
+
+/// The smallest and the largest number of boxes for trials.
+const LEAST_BOXES: usize = 2;
+const MOST_BOXES: usize = 12;
+
+/// At most one voxel in this many is used for trials.
+const LARGEST_SHARE: usize = 8;
