@@ -41,6 +41,36 @@ pub fn load_as<T>(ty: SampleType, bytes: &[u8], out: &mut [T], of: impl Fn(f64) 
     for_type!(ty, run, bytes, out);
 }
 
+/// The largest magnitude of the first `count` samples of rows of so many bytes each. Ignores NaN.
+pub(crate) fn magnitude_of_rows(ty: SampleType, rows: &[u8], row: usize, count: usize) -> f64 {
+    macro_rules! run {
+        ($t:ty, $rows:expr) => {
+            dispatch!(magnitude_of($rows, row, count, |sample| f64::from(<$t>::from_le_bytes(sample))))
+        };
+    }
+    for_type!(ty, run, rows)
+}
+
+#[inline(always)]
+fn magnitude_of<const SIZE: usize>(rows: &[u8], row: usize, count: usize, of: impl Fn([u8; SIZE]) -> f64) -> f64 {
+    let mut lanes = [0.0; RANGE_LANES];
+    for row in rows.chunks_exact(row) {
+        let (some, last) = row.as_chunks::<SIZE>().0[..count].as_chunks::<RANGE_LANES>();
+        for samples in some {
+            for l in 0..RANGE_LANES {
+                keep_larger(&mut lanes[l], of(samples[l]));
+            }
+        }
+        last.iter().for_each(|sample| keep_larger(&mut lanes[0], of(*sample)));
+    }
+    lanes.into_iter().fold(0.0, f64::max)
+}
+
+#[inline(always)]
+fn keep_larger(largest: &mut f64, value: f64) {
+    *largest = if value.abs() > *largest { value.abs() } else { *largest };
+}
+
 /// Fills each element of `out` with `N` neighbouring samples. The next element starts `stride` samples later.
 pub(crate) fn load_strided<const N: usize>(ty: SampleType, bytes: &[u8], stride: usize, out: &mut [[f64; N]]) {
     macro_rules! run {

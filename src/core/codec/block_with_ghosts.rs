@@ -14,20 +14,35 @@ pub struct BlockWithGhosts {
     pub known: [usize; 3],
 }
 
-/// Samples of a caller, or a copy of some.
-pub(super) enum MaybeCopied<'a> {
+/// The little-endian bytes of samples, frame by frame.
+#[derive(Debug)]
+pub enum SampleBytes<'a> {
+    /// Those of a caller.
     Lent(&'a [u8]),
-    Copied(Buffer<u8>),
+    /// A copy of some, or those that a caller gave away: possibly with room for the voxels that a block is extended by.
+    Own(Buffer<u8>),
 }
 
-impl Deref for MaybeCopied<'_> {
+impl Deref for SampleBytes<'_> {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
         match self {
             Self::Lent(samples) => samples,
-            Self::Copied(samples) => samples,
+            Self::Own(samples) => samples,
         }
+    }
+}
+
+impl<'a> From<&'a [u8]> for SampleBytes<'a> {
+    fn from(samples: &'a [u8]) -> Self {
+        Self::Lent(samples)
+    }
+}
+
+impl From<Buffer<u8>> for SampleBytes<'_> {
+    fn from(samples: Buffer<u8>) -> Self {
+        Self::Own(samples)
     }
 }
 
@@ -41,26 +56,38 @@ impl From<[usize; 3]> for BlockWithGhosts {
 impl BlockWithGhosts {
     /// The samples of `outer` voxels along x, y, z, at least as many as are known. Beyond the known voxels, the last
     /// two planes are extrapolated linearly.
-    pub(super) fn extended<'a>(&self, codec: &WindowCodec, outer: [usize; 3], samples: &'a [u8]) -> MaybeCopied<'a> {
+    pub(super) fn extended<'a>(
+        &self,
+        codec: &WindowCodec,
+        outer: [usize; 3],
+        samples: SampleBytes<'a>,
+    ) -> SampleBytes<'a> {
         if self.known == outer {
-            return MaybeCopied::Lent(samples);
+            return samples;
         }
-        let mut known = self.known;
-        let mut extended = copied(codec.sample, samples, known, known, outer);
+        let (ty, mut known) = (codec.sample, self.known);
+        let room = codec.frames() * outer.iter().product::<usize>() * ty.size();
+        let mut extended = match samples {
+            SampleBytes::Own(mut samples) if samples.len() == room => {
+                move_apart(ty, codec.frames(), &mut samples, known, outer);
+                samples
+            }
+            samples => copied(ty, &samples, known, known, outer),
+        };
         for axis in 0..3 {
             if known[axis] < outer[axis] {
                 extrapolate(codec, &mut extended, outer, known, axis, known[axis]);
                 known[axis] += 1;
             }
         }
-        MaybeCopied::Copied(extended)
+        SampleBytes::Own(extended)
     }
 
     /// The nodes of a block of a tier above 0, from what is known: those in the volume and, along axes that have a node behind it,
     /// the volume's last two planes of voxels. Those are extrapolated as for the blocks below.
-    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> MaybeCopied<'a> {
+    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> SampleBytes<'a> {
         if self.known == self.size {
-            return MaybeCopied::Lent(samples);
+            return SampleBytes::Lent(samples);
         }
         let mut known = self.known;
         let mut nodes = Buffer::from(samples);
@@ -70,7 +97,7 @@ impl BlockWithGhosts {
                 known[axis] -= 1;
             }
         }
-        MaybeCopied::Copied(copied(codec.sample, &nodes, self.size, self.known, self.size))
+        SampleBytes::Own(copied(codec.sample, &nodes, self.size, self.known, self.size))
     }
 }
 
@@ -78,13 +105,21 @@ impl BlockWithGhosts {
 pub(super) fn copied(ty: SampleType, samples: &[u8], size: [usize; 3], from: [usize; 3], to: [usize; 3]) -> Buffer<u8> {
     let each = ty.size();
     let frames = samples.len() / (each * from.iter().product::<usize>());
-    let row = |of: [usize; 3], t: usize, z: usize, y: usize| each * of[0] * (y + of[1] * (z + of[2] * t));
     let mut out = Buffer::with_len(frames * to.iter().product::<usize>() * each);
-    for (t, z, y) in rows(frames, [size[1], size[2]]) {
-        let samples = &samples[row(from, t, z, y)..][..size[0] * each];
-        out[row(to, t, z, y)..][..samples.len()].copy_from_slice(samples);
+    for at in rows(frames, size) {
+        let samples = &samples[each * first(from, at)..][..size[0] * each];
+        out[each * first(to, at)..][..samples.len()].copy_from_slice(samples);
     }
     out
+}
+
+/// Moves the samples of `from` voxels to their places in an array of `to` voxels. The others are arbitrary.
+fn move_apart(ty: SampleType, frames: usize, samples: &mut [u8], from: [usize; 3], to: [usize; 3]) {
+    let each = ty.size();
+    for at in rows(frames, from).rev() {
+        let start = each * first(from, at);
+        samples.copy_within(start..start + from[0] * each, each * first(to, at)); // rows before it lie before its new place
+    }
 }
 
 /// Extrapolates a plane of samples across an axis: twice the last of the known planes minus the one before it. Where one of the
@@ -119,7 +154,20 @@ fn extrapolate(codec: &WindowCodec, samples: &mut [u8], size: [usize; 3], known:
     }
 }
 
-/// The numbers (t, z, y) of rows.
-fn rows(frames: usize, [y, z]: [usize; 2]) -> impl Iterator<Item = (usize, usize, usize)> {
-    (0..frames).flat_map(move |t| (0..z).flat_map(move |z| (0..y).map(move |y| (t, z, y))))
+/// A row of a frame.
+#[derive(Clone, Copy)]
+struct RowOfFrame {
+    frame: usize,
+    z: usize,
+    y: usize,
+}
+
+/// The rows of `frames` frames of `size` voxels, in order.
+fn rows(frames: usize, [_, y, z]: [usize; 3]) -> impl DoubleEndedIterator<Item = RowOfFrame> {
+    (0..frames).flat_map(move |frame| (0..z).flat_map(move |z| (0..y).map(move |y| RowOfFrame { frame, z, y })))
+}
+
+/// The number of a row's first sample in an array of so many voxels.
+fn first([x, y, z]: [usize; 3], row: RowOfFrame) -> usize {
+    x * (row.y + y * (row.z + z * row.frame))
 }

@@ -1,8 +1,7 @@
 //! The samples of a block within an array of more voxels.
 
-use super::block_with_ghosts::{MaybeCopied, copied};
+use super::block_with_ghosts::{SampleBytes, copied};
 use crate::base::sample::{self, SampleType};
-use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane};
 
 /// Samples of a box, frame by frame, in an array that may have more voxels along each axis. An index is `frame * voxels + voxel` in the
@@ -60,11 +59,16 @@ impl<'a> BoxSamples<'a> {
     }
 
     /// The samples side by side.
-    pub(super) fn contiguous(&self) -> MaybeCopied<'a> {
+    pub(super) fn contiguous(&self) -> SampleBytes<'a> {
         match self.is_whole() {
-            true => MaybeCopied::Lent(self.bytes),
-            false => MaybeCopied::Copied(copied(self.ty, self.bytes, self.size, self.of, self.size)),
+            true => SampleBytes::Lent(self.bytes),
+            false => SampleBytes::Own(copied(self.ty, self.bytes, self.size, self.of, self.size)),
         }
+    }
+
+    /// The samples of a whole array of 32-bit floats.
+    pub(super) fn singles(&self) -> Option<&'a [[u8; 4]]> {
+        (self.is_whole() && self.ty == SampleType::F32).then(|| self.bytes.as_chunks().0)
     }
 
     /// Calls `visit(index of the first, values)` for runs of samples, in order.
@@ -90,17 +94,13 @@ impl<'a> BoxSamples<'a> {
         }
     }
 
-    /// The largest magnitude, which is at most `limit`. No sample may be missing.
-    pub(super) fn magnitude(&self, limit: f64) -> f64 {
-        let (mut values, mut largest) = (vec![0.0; self.size[0]], 0.0);
-        for row in self.rows() {
-            sample::load(self.ty, row, &mut values);
-            largest = dispatch!(larger(&values[..], largest));
-            if largest >= limit {
-                break;
-            }
-        }
-        largest
+    /// The largest magnitude. No sample may be missing.
+    pub(super) fn magnitude(&self) -> f64 {
+        let (planes, rows) = (self.of[0] * self.of[1] * self.ty.size(), self.of[0] * self.ty.size());
+        let frames = self.bytes.chunks_exact(planes * self.of[2]);
+        let planes = frames.flat_map(|frame| frame.chunks_exact(planes).take(self.size[2]));
+        let [x, y, _] = self.size;
+        planes.fold(0.0, |most, plane| most.max(sample::magnitude_of_rows(self.ty, &plane[..rows * y], rows, x)))
     }
 
     /// Loads the series of `count` voxels, beginning with `first`: one lane for each frame. Unused elements of lanes are zero.
@@ -149,19 +149,6 @@ impl<'a> BoxSamples<'a> {
     }
 }
 
-/// The largest magnitude of some values and of `largest`.
-#[inline(always)]
-fn larger(values: &[f64], largest: f64) -> f64 {
-    let mut lanes = [largest; 2 * LANES];
-    let (some, last) = values.as_chunks::<{ 2 * LANES }>();
-    for values in some {
-        for (largest, v) in lanes.iter_mut().zip(values) {
-            *largest = if v.abs() > *largest { v.abs() } else { *largest };
-        }
-    }
-    last.iter().map(|v| v.abs()).chain(lanes).fold(0.0, f64::max)
-}
-
 /// Samples that are visited together.
 const RUN: usize = 512;
 
@@ -194,7 +181,7 @@ mod tests {
             assert_eq!(runs(&some), runs(&whole));
             let all = values_of(&copy);
             let largest = all.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-            assert_eq!([some.magnitude(largest), some.magnitude(f64::INFINITY)], [largest; 2]);
+            assert_eq!(some.magnitude(), largest);
             assert!((0..some.len()).all(|index| some.sample(index) == whole.sample(index)));
             for (first, count) in crate::codec::lane_groups(some.voxels()) {
                 let lanes = |of: &BoxSamples<'_>| {

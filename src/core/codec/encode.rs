@@ -11,7 +11,7 @@
 //! So the bound holds for any finite input and any basis, and includes rounding and quantisation errors. Missing
 //! samples are stored without loss: a mask, and their own bytes.
 
-use super::block_with_ghosts::BlockWithGhosts;
+use super::block_with_ghosts::{BlockWithGhosts, SampleBytes};
 use super::box_samples::BoxSamples;
 use super::buffer::{Buffer, clear};
 use super::check::Tally;
@@ -49,18 +49,19 @@ impl Encoder {
         Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new() })
     }
 
-    /// Encodes a block of some voxels. `samples` are little-endian, frame by frame; `above` is the block above, if there are tiers.
-    pub fn block(
+    /// Encodes a block of some voxels. `samples` are those of the known voxels, and may be given away with room for
+    /// [`WindowCodec::outer_size`]; `above` is the block above, if there are tiers.
+    pub fn block<'a>(
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
         of: impl Into<BlockWithGhosts>,
-        samples: &[u8],
+        samples: impl Into<SampleBytes<'a>>,
         above: Option<&Above>,
     ) -> wavesplat_format::Result<Encoded> {
         let of: BlockWithGhosts = of.into();
         let (size, around) = (of.size, codec.outer_size(of.size));
-        let extended = of.extended(codec, around, samples);
+        let extended = of.extended(codec, around, samples.into());
         let missing_around = Missing::find(codec, &extended);
         let outer = BoxSamples::whole(codec.sample, &extended, around);
         let outer = Source { codec, samples: outer, missing: &missing_around };

@@ -37,7 +37,7 @@ impl Missing {
     pub(super) fn within(codec: &WindowCodec, samples: &BoxSamples<'_>, around: &Self) -> Self {
         match around.count {
             0 => {
-                let magnitude = if samples.is_whole() { around.magnitude } else { samples.magnitude(around.magnitude) };
+                let magnitude = if samples.is_whole() { around.magnitude } else { samples.magnitude() };
                 Self { mask: Vec::new(), all: samples.len(), count: 0, magnitude }
             }
             _ => Self::find(codec, &samples.contiguous()),

@@ -37,6 +37,27 @@ pub trait Real:
     fn singles(values: &[Self]) -> Option<&[f32]>;
 }
 
+/// A value that becomes a node.
+pub trait IntoNode<R>: Copy {
+    /// The node.
+    fn node(self) -> R;
+}
+
+impl<R: Real> IntoNode<R> for R {
+    #[inline(always)]
+    fn node(self) -> R {
+        self
+    }
+}
+
+/// The little-endian bytes of a 32-bit float.
+impl<R: Real> IntoNode<R> for [u8; 4] {
+    #[inline(always)]
+    fn node(self) -> R {
+        R::from_f64(f32::from_le_bytes(self).into())
+    }
+}
+
 impl Real for f32 {
     const MOST_CODE: Self = 2_097_152.0;
     const LARGEST: f64 = f32::MAX as f64 / 4096.0;

@@ -114,11 +114,18 @@ impl Source<'_> {
             return Some(zero);
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
-        let source = outer.load(&weighing);
+        let singles = outer.samples.singles().filter(|_| outer.plain() && outer.missing.count == 0);
+        let source: SourceNodes<R> = if singles.is_some() { SourceNodes::default() } else { outer.load(&weighing) };
         let encode = |step, field: &mut [R], codes: &mut [i32]| {
-            let marked = source.marked(passes.negligible(step));
-            let nodes = Nodes { values: &source.values, size: outer.samples.size(), marked: Some(&marked) };
-            passes.encode(step, nodes, known, field, codes).then_some(())
+            let (size, marked) = (outer.samples.size(), source.marked(passes.negligible(step)));
+            let fits = match singles {
+                Some(values) => passes.encode(step, Nodes { values, size, marked: None }, known, field, codes),
+                None => {
+                    let nodes: Nodes<'_, R> = Nodes { values: &source.values, size, marked: Some(&marked) };
+                    passes.encode(step, nodes, known, field, codes)
+                }
+            };
+            fits.then_some(())
         };
         encode(step, field, codes)?;
         let check = |field: &[R], codes: &[i32]| self.checked(&weighing, &passes, known, field, codes);
@@ -136,6 +143,7 @@ impl Source<'_> {
                 }
             }
         }
+        drop(source); // its memory serves for the changes
         let Checked { marked, tally } = checked;
         let mut tally = tally?;
         let outliers = tally.take_outliers(&self.samples);

@@ -1,7 +1,7 @@
 //! Estimates the bytes of a box of samples coded by a pyramid, without packing codes and with few series compared.
 
 use super::WindowCodec;
-use super::block_with_ghosts::{BlockWithGhosts, MaybeCopied};
+use super::block_with_ghosts::{BlockWithGhosts, SampleBytes};
 use super::box_samples::BoxSamples;
 use super::buffer::Buffer;
 use super::encode::listed;
@@ -16,7 +16,7 @@ use wavesplat_format::Pyramid;
 pub struct Trial<'a, R: Real> {
     size: [usize; 3],
     /// The samples of the voxels of all nodes.
-    samples: MaybeCopied<'a>,
+    samples: SampleBytes<'a>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
     /// The nodes of the box, and the nodes beyond it that may predict them.
@@ -28,7 +28,7 @@ pub struct Trial<'a, R: Real> {
 impl<'a, R: Real> Trial<'a, R> {
     /// Pyramids may use the nodes of `outer` voxels.
     pub fn new(codec: &WindowCodec, of: BlockWithGhosts, outer: [usize; 3], samples: &'a [u8]) -> Self {
-        let (size, samples) = (of.size, of.extended(codec, outer, samples));
+        let (size, samples) = (of.size, of.extended(codec, outer, samples.into()));
         let around = Missing::find(codec, &samples);
         let own = BoxSamples::new(codec.sample, &samples, outer, size);
         let missing = Missing::within(codec, &own, &around);
@@ -134,7 +134,7 @@ mod tests {
             let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 32);
             let mut encoder = Encoder::new(3).expect("a usual level");
             let id = BlockId::new(0, 0, 0);
-            let encoded = encoder.block(&codec, id, SIZE, &samples, None).expect("a small block");
+            let encoded = encoder.block(&codec, id, SIZE, &samples[..], None).expect("a small block");
             let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
             let trial = Trial::<f32>::new(&codec, SIZE.into(), codec.outer_size(SIZE), &samples);
             let estimate = trial.bytes(&codec, &pyramid);

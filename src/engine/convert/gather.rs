@@ -12,7 +12,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
-use wavesplat_core::base::sample::{self, join_ranges};
+use wavesplat_core::base::sample::{self, SampleType, join_ranges};
+use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::{self, Bound, ErrorBound};
 use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::scheme::Scheme;
@@ -27,7 +28,7 @@ pub(super) struct NextBlock {
     pub(super) block: BlockSamples,
 }
 
-/// The samples of a block, frame by frame.
+/// The samples of a block, frame by frame. Blocks of tier 0 have room behind them for the voxels that they are extended by.
 #[derive(Debug)]
 pub(super) struct BlockSamples {
     pub(super) id: BlockId,
@@ -316,7 +317,8 @@ impl<'a> WindowReader<'a> {
         }
         let (block, all) = (read.id.block as usize, self.plan.blocks.len());
         let (extent, ty) = (self.plan.block_with_ghosts(&job.codec, block), self.archive.sample);
-        self.findings.variation.add_block(block, all, &extent, ty, self.config.missing_value, &read.samples);
+        let samples = &read.samples[..window_bytes(job, extent.known, ty)];
+        self.findings.variation.add_block(block, all, &extent, ty, self.config.missing_value, samples);
     }
 
     /// Reads and sends the window's blocks. False if the receiver is gone.
@@ -360,11 +362,11 @@ impl<'a> WindowReader<'a> {
             return self.gather_coarse(window, job, id);
         }
         let Region { start, .. } = self.plan.blocks.region(id.block as usize);
-        let known = self.plan.block_with_ghosts(&job.codec, id.block as usize).known;
+        let BlockWithGhosts { size, known } = self.plan.block_with_ghosts(&job.codec, id.block as usize);
         let region = Region { start, end: std::array::from_fn(|a| start[a] + known[a]) };
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
-        let mut samples = Buffer::with_len(window.frames() * region.voxels() * sample.size());
-        read_frames_into(window, 0..window.frames(), &region, &mut samples)?;
+        let mut samples = Buffer::with_len(window_bytes(job, job.codec.outer_size(size), sample));
+        read_frames_into(window, 0..window.frames(), &region, &mut samples[..window_bytes(job, known, sample)])?;
         Ok(BlockSamples { id, samples })
     }
 
@@ -391,6 +393,11 @@ impl<'a> WindowReader<'a> {
         }
         Ok(BlockSamples { id, samples })
     }
+}
+
+/// Bytes of so many voxels in all frames of a window.
+fn window_bytes(job: &WindowJob, voxels: [usize; 3], sample: SampleType) -> usize {
+    job.codec.frames() * voxels.iter().product::<usize>() * sample.size()
 }
 
 /// Bytes of the rows that are read together for blocks of tiers above 0.

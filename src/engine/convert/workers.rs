@@ -169,7 +169,7 @@ fn encode_next(
 ) -> Result<Encoded> {
     let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
     let samples = to_channel(plan.colour_transform, id, samples);
-    let encoded = encode_block(&mut encoder, plan, window, id, &samples);
+    let encoded = encode_block(&mut encoder, plan, window, id, samples);
     encoders.put(encoder);
     encoded
 }
@@ -180,7 +180,7 @@ fn encode_block(
     plan: &Plan<'_>,
     window: &WindowJob,
     id: BlockId,
-    samples: &[u8],
+    samples: Buffer<u8>,
 ) -> Result<Encoded> {
     let above = window.coarse.above(plan, &window.codec, id)?;
     if id.tier == 0 {
@@ -189,7 +189,7 @@ fn encode_block(
     }
     let codec = window.codec.at(id.tier, 0);
     let nodes = plan.coarse_nodes(&codec, id);
-    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
+    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, &samples, above.as_ref());
     let (block, field) = coded.map_err(bug)?;
     window.coarse.add(&codec, &block, field)?;
     Ok(Encoded { block, share: 0.0 })

@@ -6,7 +6,7 @@ use super::known::Nodes;
 use super::refine::gather;
 use crate::base::vectors::dispatch;
 use crate::codec::buffer::Buffer;
-use crate::codec::real::Real;
+use crate::codec::real::{IntoNode, Real};
 use std::ops::Range;
 use wavesplat_format::Pass;
 
@@ -20,10 +20,10 @@ impl PredictionPasses<'_> {
     /// Encodes the source's nodes, and fills the field with the decoded ones. The source may have more nodes than are needed.
     /// NaN nodes get the code 0. False if a code does not fit. `codes` are in order, pass after pass. Where neither the source nor
     /// known nodes mark a k, its codes are zero, and its nodes in the field arbitrary.
-    pub(crate) fn encode<R: Real>(
+    pub(crate) fn encode<R: Real, V: IntoNode<R>>(
         &self,
         step: f64,
-        source: Nodes<'_, R>,
+        source: Nodes<'_, V>,
         known: Option<Nodes<'_, R>>,
         field: &mut [R],
         codes: &mut [i32],
@@ -49,7 +49,7 @@ impl PredictionPasses<'_> {
     }
 
     /// Sorts the source's nodes of a pyramid by the passes that add them.
-    fn split<R: Real>(&self, source: &[R], size: [usize; 3], split: &mut [R]) {
+    fn split<R: Real, V: IntoNode<R>>(&self, source: &[V], size: [usize; 3], split: &mut [R]) {
         let mut rest = split;
         for pass in &self.passes {
             let (added, after) = std::mem::take(&mut rest).split_at_mut(pass.codes());

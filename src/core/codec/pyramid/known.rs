@@ -18,17 +18,19 @@ pub(crate) struct Nodes<'a, R> {
     pub(crate) marked: Option<&'a [bool]>,
 }
 
+impl<V> Nodes<'_, V> {
+    /// Whether a k may have nodes that are not zero.
+    pub(super) fn has(&self, k: usize) -> bool {
+        self.marked.is_none_or(|marked| marked[k])
+    }
+}
+
 impl<R: Real> Nodes<'_, R> {
     /// Whether all nodes of all these k are zero.
     pub(crate) fn is_zero(&self, mut ks: Range<usize>) -> bool {
         let each: usize = self.size.iter().product();
         let nodes = |k: usize| self.values.get(k * each..(k + 1) * each).unwrap_or_default();
         ks.all(|k| !self.has(k) || rows::is_zero(nodes(k)))
-    }
-
-    /// Whether a k may have nodes that are not zero.
-    pub(super) fn has(&self, k: usize) -> bool {
-        self.marked.is_none_or(|marked| marked[k])
     }
 
     /// The rest of a row of nodes, from the `x`-th on, and what follows it. Empty if all are zero.

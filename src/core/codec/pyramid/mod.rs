@@ -41,7 +41,6 @@ mod tests;
 #[cfg(test)]
 mod tier_tests;
 
-use super::buffer::Buffer;
 use super::codes::PooledCodes;
 use super::real::Real;
 use super::rows::{self, Change, add_changes, add_changes_to_zero, count_nonzero};
@@ -362,7 +361,6 @@ impl<'a> PredictionPasses<'a> {
         if !parts.contains(&true) {
             return changes;
         }
-        let mut rest = Buffer::with_len(self.pyramid_nodes());
         let pyramids = field.values.chunks_exact(self.pyramid_nodes()).enumerate();
         for (number, nodes) in pyramids.filter(|(number, _)| self.ks(*number).any(|k| field.has(k))) {
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| parts[*part]) {
@@ -370,8 +368,9 @@ impl<'a> PredictionPasses<'a> {
                     dispatch!(add_changes_to_zero(change, nodes));
                 } else {
                     let mut decoding = self.sparse(number, step, codes, known, part);
-                    self.stages.refine(&vec![true; self.shape[3]], &mut rest, &mut decoding);
-                    dispatch!(add_changes(change, nodes, &rest[..]));
+                    self.stages.for_each_slice(&mut decoding, |n, rest| {
+                        dispatch!(add_changes(&mut *change, &nodes[n * rest.len()..][..rest.len()], rest));
+                    });
                 }
             }
         }

@@ -7,7 +7,7 @@
 use super::corrections::Correction;
 use super::stencil::{predict_line, taps};
 use super::within::around;
-use crate::codec::real::Real;
+use crate::codec::real::{IntoNode, Real};
 use std::ops::Range;
 use wavesplat_format::{Pass, Stencil};
 
@@ -155,7 +155,7 @@ const NODES: usize = 1024;
 
 /// Copies the nodes that a pass adds, x fastest, from those of a pyramid with `size` nodes along x, y, z.
 #[inline(always)]
-pub(super) fn gather<R: Real>(source: &[R], [nx, ny, nz]: [usize; 3], pass: &Pass, added: &mut [R]) {
+pub(super) fn gather<R: Real, V: IntoNode<R>>(source: &[V], [nx, ny, nz]: [usize; 3], pass: &Pass, added: &mut [R]) {
     let ([x, y, z, t], nodes) = (pass.extent(), [0, 1, 2, 3].map(|axis| pass.nodes(axis)));
     let at = |axis: usize, i: usize| nodes[axis].0 + nodes[axis].1 * i;
     let mut rows = added.chunks_exact_mut(x);
@@ -169,14 +169,14 @@ pub(super) fn gather<R: Real>(source: &[R], [nx, ny, nz]: [usize; 3], pass: &Pas
 
 /// Copies every n-th node of a line.
 #[inline(always)]
-fn gather_line<R: Real>(line: &[R], n: usize, out: &mut [R]) {
+fn gather_line<R: Real, V: IntoNode<R>>(line: &[V], n: usize, out: &mut [R]) {
     if n == 2 && line.len() >= 2 * out.len() {
         for (to, pair) in out.iter_mut().zip(line.as_chunks::<2>().0) {
-            *to = pair[0];
+            *to = pair[0].node();
         }
     } else {
         for (i, to) in out.iter_mut().enumerate() {
-            *to = line[i * n];
+            *to = line[i * n].node();
         }
     }
 }

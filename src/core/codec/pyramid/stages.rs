@@ -166,6 +166,39 @@ impl Stages {
     /// Refines a pyramid from its coarsest nodes on: predicts nodes and has them corrected. `out` gets the slices that
     /// `wanted` marks; others are unspecified.
     pub(super) fn refine<R: Real>(&self, wanted: &[bool], out: &mut [R], correction: &mut impl Correction<R>) {
+        let coarse = self.refine_others(wanted, correction);
+        let Some(last) = self.stages.last() else { return out.copy_from_slice(&coarse) };
+        self.refine_stage(last, wanted, &coarse, out, correction);
+    }
+
+    /// As [`Self::refine`], for all slices. Calls `visit(number, nodes)` for each as soon as it is complete.
+    pub(super) fn for_each_slice<R: Real>(
+        &self,
+        correction: &mut impl Correction<R>,
+        mut visit: impl FnMut(usize, &[R]),
+    ) {
+        let all = self.lattices.last().map_or(0, |last| last.slices);
+        let coarse = self.refine_others(&vec![true; all], correction);
+        let each = self.lattices.last().map_or(0, Lattice::slice);
+        match self.stages.last() {
+            Some(last) if last.time.is_some() => {
+                let mut fine = self.buffer(all * each);
+                self.refine_stage(last, &vec![true; all], &coarse, &mut fine, correction);
+                fine.chunks_exact(each).enumerate().for_each(|(n, slice)| visit(n, slice));
+            }
+            Some(last) => {
+                let mut fine = self.buffer(each);
+                for (n, slice) in coarse.chunks_exact(coarse.len() / all).enumerate() {
+                    self.refine_slice(last, n, slice, &mut fine, correction);
+                    visit(n, &fine);
+                }
+            }
+            None => coarse.chunks_exact(each).enumerate().for_each(|(n, slice)| visit(n, slice)),
+        }
+    }
+
+    /// The nodes before the last stage that the wanted slices need.
+    fn refine_others<R: Real>(&self, wanted: &[bool], correction: &mut impl Correction<R>) -> Buffer<R> {
         let needed = self.needed(wanted);
         let first = &self.lattices[0];
         let mut coarse = self.buffer(first.slices * first.slice());
@@ -174,14 +207,14 @@ impl Stages {
             correction.correct(0, n * first.added, slice);
             correction.complete(0, n, slice, &first.within);
         }
-        let Some((last, others)) = self.stages.split_last() else { return out.copy_from_slice(&coarse) };
+        let others = self.stages.split_last().map_or(&[][..], |(_, others)| others);
         for (stage, needed) in others.iter().zip(&needed) {
             let fine = &self.lattices[stage.ends()[1]];
             let mut nodes = self.buffer(fine.slices * fine.slice());
             self.refine_stage(stage, needed, &coarse, &mut nodes, correction);
             coarse = nodes;
         }
-        self.refine_stage(last, wanted, &coarse, out, correction);
+        coarse
     }
 
     fn refine_stage<R: Real>(
