@@ -101,7 +101,11 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
 /// Codes of boxes, with zeros where they belong to another box.
 fn own(boxes: &[CodeBox], codes: Vec<i32>) -> Vec<i32> {
     let of_boxes = DenseCodes::one_after_another(&codes, boxes);
-    if boxes.is_empty() { codes } else { of_boxes.iter().flat_map(|of| of.contiguous().into_owned()).collect() }
+    if boxes.is_empty() {
+        codes
+    } else {
+        of_boxes.iter().flat_map(|of| of.contiguous(&mut Vec::new()).to_vec()).collect()
+    }
 }
 
 /// Packs and compresses a block's content.

@@ -1,7 +1,5 @@
 //! Codes as a list of those that are not zero.
 
-use std::borrow::Cow;
-
 /// Where the codes of a box lie in the decoder's arrays: one array for each k of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CodeBox {
@@ -83,21 +81,22 @@ impl<'a> DenseCodes<'a> {
         boxes.iter().map(of_box).collect()
     }
 
-    /// The codes of the box side by side, zero where they belong to another box.
-    pub(crate) fn contiguous(&self) -> Cow<'_, [i32]> {
+    /// The codes of the box side by side, zero where they belong to another box. `scratch` may hold them.
+    pub(crate) fn contiguous<'b>(&'b self, scratch: &'b mut Vec<i32>) -> &'b [i32] {
         let Self { codes, slice, at } = *self;
         let [x, y, z, t] = at.extents;
         if at == CodeBox::contiguous(at.extents) && slice == x * y * z {
-            return Cow::Borrowed(&codes[..x * y * z * t]);
+            return &codes[..x * y * z * t];
         }
-        let mut side_by_side = Vec::with_capacity(x * y * z * t);
+        scratch.clear();
+        scratch.reserve(x * y * z * t);
         for (t, z, y) in (0..t).flat_map(|t| (0..z).flat_map(move |z| (0..y).map(move |y| (t, z, y)))) {
             let row = &codes[t * slice + at.first + y * at.strides[1] + z * at.strides[2]..];
             let allowed = at.allowed >> (2 * (y % 2) + 4 * (z % 2));
             let own = |(x, code): (usize, &i32)| if allowed >> (x % 2) & 1 == 1 { *code } else { 0 };
-            side_by_side.extend(row.iter().step_by(at.strides[0]).take(x).enumerate().map(own));
+            scratch.extend(row.iter().step_by(at.strides[0]).take(x).enumerate().map(own));
         }
-        Cow::Owned(side_by_side)
+        scratch
     }
 }
 

@@ -68,7 +68,7 @@ impl<'a> BoxSamples<'a> {
 
     /// The samples of a whole array of 32-bit floats.
     pub(super) fn singles(&self) -> Option<&'a [[u8; 4]]> {
-        (self.is_whole() && self.ty == SampleType::F32).then(|| self.bytes.as_chunks().0)
+        (self.is_whole() && self.ty == SampleType::F32).then_some(self.bytes.as_chunks().0)
     }
 
     /// Calls `visit(index of the first, values)` for runs of samples, in order.

@@ -2,6 +2,7 @@
 
 use super::WindowCodec;
 use super::box_samples::BoxSamples;
+use super::load::Missing;
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
 use crate::codec::bound::{Bound, Measure, share};
@@ -65,6 +66,24 @@ impl Tally {
     pub(super) fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
         Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers: Vec::new(), is_clear: Vec::new() }
+    }
+
+    /// That of samples that are decoded to zeros within a bound of single samples.
+    pub(super) fn of_zeros(codec: &WindowCodec, samples: &BoxSamples<'_>, missing: &Missing) -> Self {
+        let mut tally = Self::new();
+        if missing.count < missing.all as u64 {
+            tally.add(0.0, missing.magnitude);
+            tally.share = share(missing.magnitude, codec.bound.allowed(missing.magnitude)).min(1.0);
+        }
+        tally.squared_error = 0.0;
+        samples.for_each_run(|first, values| {
+            let present = |at: usize| !missing.has(first + at);
+            tally.squared_error += match missing.count {
+                0 => dispatch!(sum_of_squares(values)),
+                _ => values.iter().enumerate().filter(|(at, _)| present(*at)).map(|(_, v)| v * v).sum(),
+            };
+        });
+        tally
     }
 
     pub(super) fn add(&mut self, decoded: f64, error: f64) {
@@ -300,6 +319,18 @@ impl LaneStats {
 }
 
 #[inline(always)]
+fn sum_of_squares(values: &[f64]) -> f64 {
+    let (some, last) = values.as_chunks::<LANES>();
+    let mut lanes = Lane::default();
+    for values in some {
+        for l in 0..LANES {
+            lanes[l] += values[l] * values[l];
+        }
+    }
+    lanes.iter().sum::<f64>() + last.iter().map(|v| v * v).sum::<f64>()
+}
+
+#[inline(always)]
 fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, limits: [f64; 2], is_clear: &mut [Lane]) {
     for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
@@ -320,6 +351,35 @@ mod tests {
     use crate::codec::bound::ErrorBound;
     use crate::codec::scheme::Scheme;
     use crate::wavelet::Basis;
+
+    #[test]
+    fn zeros_are_tallied_like_other_decoded_samples() {
+        let (frames, voxels) = (3, 29);
+        let values: Vec<f64> = (0..frames * voxels).map(|i| ((i * 7919) % 101) as f64 / 50.0 - 1.0).collect();
+        let mut bytes = vec![0; values.len() * 4];
+        sample::store(SampleType::F32, &values, &mut bytes);
+        for (bound, delta) in [(Bound::Pointwise, 1.5), (Bound::Relative { floor: 3.0 }, 1.5)] {
+            let bound = ErrorBound { bound, tolerance: 0.5, delta };
+            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, SampleType::F32, bound, 8);
+            for declared in [None, Some(f64::from(values[40] as f32))] {
+                codec.missing_value = declared;
+                let (samples, missing) =
+                    (BoxSamples::whole(SampleType::F32, &bytes, [voxels, 1, 1]), Missing::find(&codec, &bytes));
+                assert_eq!(missing.count > 0, declared.is_some());
+                let mut slow = Tally::new();
+                samples.for_each_run(|first, values| {
+                    let present = values.iter().enumerate().filter(|(at, _)| !missing.has(first + at));
+                    present.for_each(|(_, v)| {
+                        slow.add(0.0, v.abs());
+                        slow.share = slow.share.max(share(v.abs(), codec.bound.allowed(*v)));
+                    });
+                });
+                let fast = Tally::of_zeros(&codec, &samples, &missing);
+                assert_eq!((fast.min, fast.max, fast.reached, fast.share), (0.0, 0.0, slow.reached, slow.share));
+                assert!((fast.squared_error - slow.squared_error).abs() <= 1e-12 * slow.squared_error);
+            }
+        }
+    }
 
     #[test]
     fn vector_code_agrees_with_samples_one_by_one() {

@@ -11,7 +11,7 @@ use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::forward::forward;
 use super::load::{Missing, load_group};
-use super::pyramid::{Nodes, PredictionPasses};
+use super::pyramid::Nodes;
 use super::real::Real;
 use super::rows::count_nonzero;
 use super::screen::{self, Screen};
@@ -110,7 +110,7 @@ impl Source<'_> {
         let passes = self.codec.passes(pyramid, size);
         codes.renew(passes.codes());
         field.renew(passes.nodes().iter().product());
-        if let Some(zero) = self.zero(&weighing, &passes, field) {
+        if let Some(zero) = self.zero(&weighing, field) {
             return Some(zero);
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
@@ -128,7 +128,11 @@ impl Source<'_> {
             fits.then_some(())
         };
         encode(step, field, codes)?;
-        let check = |field: &[R], codes: &[i32]| self.checked(&weighing, &passes, known, field, codes);
+        let check = |field: &[R], codes: &[i32]| {
+            let marked = passes.marked_codes(codes, known);
+            let tally = self.compared(&weighing, field, &marked);
+            Checked { marked, tally }
+        };
         let mut checked = check(field, codes);
         let finest = step / self.codec.scheme.coarseness.max(1.0);
         while checked.has_many_outliers(self.missing.all, codes) && step > finest {
@@ -156,42 +160,32 @@ impl Source<'_> {
     }
 
     /// The block with zeros in place of the nodes above and its own, if its samples are within the bound of that.
-    fn zero<R: Real>(
-        &self,
-        weighing: &QuantizerSetup,
-        passes: &PredictionPasses<'_>,
-        field: &mut [R],
-    ) -> Option<Coded> {
+    fn zero<R: Real>(&self, weighing: &QuantizerSetup, field: &mut [R]) -> Option<Coded> {
         let magnitude = self.missing.magnitude;
         let is_small = self.codec.tier == 0 && magnitude <= self.codec.bound.allowed(magnitude);
         if self.codec.tiers() == 0 || !is_small {
             return None;
         }
-        field.fill(R::default());
-        let codes = vec![0; passes.codes()];
-        let tally = self.checked(weighing, passes, None, field, &codes).tally?;
+        let tally = match self.codec.bound.measure() {
+            Measure::Largest if !self.codec.is_missing(0.0) => Tally::of_zeros(self.codec, &self.samples, self.missing),
+            _ => {
+                field.fill(R::default());
+                self.compared(weighing, field, &vec![false; self.codec.basis.coefficients()])?
+            }
+        };
         let parts = Some(vec![PartStats { count: 0, energy: 0.0, largest: 0.0 }; self.codec.parts()]);
         let (dropped, outliers) = (tally.squared_error, Outliers::default());
         let marked = Vec::new();
         tally.outliers.is_empty().then_some(Coded { step: 0.0, marked, parts, dropped, outliers, tally })
     }
 
-    /// Compares the field that codes give with the source.
-    fn checked<R: Real>(
-        &self,
-        weighing: &QuantizerSetup,
-        passes: &PredictionPasses<'_>,
-        known: Option<Nodes<'_, R>>,
-        field: &[R],
-        codes: &[i32],
-    ) -> Checked {
-        let marked = passes.marked_codes(codes, known);
-        let tally = match self.plain() {
+    /// Compares a field with the source; it is zero for each k that is not marked. None if too many samples miss the bound.
+    fn compared<R: Real>(&self, weighing: &QuantizerSetup, field: &[R], marked: &[bool]) -> Option<Tally> {
+        match self.plain() {
             _ if self.codec.tier > 0 => Some(Tally::new()), // its samples are stored with the blocks below
             true if !Screen::applies::<R>(self) => self.check_samples(field),
-            _ => self.check_series(weighing, field, &marked),
-        };
-        Checked { marked, tally }
+            _ => self.check_series(weighing, field, marked),
+        }
     }
 
     /// The step of the finest level. None if the block must be stored exactly.

@@ -8,8 +8,8 @@
 //! nodes.
 
 use super::learn::learned_functions;
-use super::smoothness::roughest_first;
-use super::trial_boxes::{BoxSizes, Sampled};
+use super::smoothness::{AXES, roughest_first};
+use super::trial_boxes::{BoxSizes, Sampled, TrialBoxes};
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -96,7 +96,7 @@ impl SchemeSelector<'_> {
     }
 
     fn smallest_of<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
-        let boxes = self.boxes(BoxSizes::Small)?;
+        let boxes = self.boxes().read(BoxSizes::Small)?;
         let families = self.families(&self.order(&boxes))?;
         let (mut learned, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|f| f.basis == Basis::Learned);
         let mut trials = self.transformed::<R>(&others, &boxes);
@@ -146,11 +146,11 @@ impl SchemeSelector<'_> {
         trials: &[Transformed<'_, R>],
     ) -> Result<Scheme> {
         let of_small = self.or_variants(best.clone(), Self::ghosts, trials).scheme;
-        let sizes = [BoxSizes::Small, BoxSizes::Large].map(|sizes| self.box_size(sizes));
+        let sizes = [BoxSizes::Small, BoxSizes::Large].map(|sizes| self.boxes().size(sizes));
         if of_small == best.scheme || sizes[0] == sizes[1] {
             return Ok(of_small);
         }
-        let boxes = self.boxes(BoxSizes::Large)?;
+        let boxes = self.boxes().read(BoxSizes::Large)?;
         let trials = self.transformed::<R>(std::slice::from_ref(&best.scheme), &boxes);
         Ok(self.or_variants(self.tried(best.scheme, &trials), Self::ghosts, &trials).scheme)
     }
@@ -234,12 +234,19 @@ impl SchemeSelector<'_> {
         let codec = &*self.with_scheme(&scheme, of_basis);
         let of_boxes: Vec<usize> = of_basis.boxes.par_iter().map(|b| b.bytes(codec, pyramid)).collect();
         let voxels = of_basis.boxes.iter().map(Trial::voxels).sum::<usize>() as f64;
-        let bytes = of_boxes.iter().sum::<usize>() as f64 * self.voxels() as f64 / voxels + bytes_of_functions(&scheme);
+        let bytes =
+            of_boxes.iter().sum::<usize>() as f64 * self.boxes().voxels() as f64 / voxels + bytes_of_functions(&scheme);
         Tried { scheme, bytes, of_boxes }
     }
 
+    /// Where boxes are taken from.
+    fn boxes(&self) -> TrialBoxes<'_> {
+        let pyramid = self.pyramid(&AXES, Stencil::Cubic);
+        TrialBoxes { archive: self.archive, channels: self.channels, most: self.most, pyramid }
+    }
+
     /// The number of frames in the window.
-    pub(super) fn frames(&self) -> usize {
+    fn frames(&self) -> usize {
         self.channels[0].frames()
     }
 
@@ -308,14 +315,14 @@ impl SchemeSelector<'_> {
     fn functions(&self) -> Result<Vec<i16>> {
         let size = [self.archive.grid.dims[0], 1, 1];
         let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
-        let rows: Result<Vec<Sampled>> = (0..rows).map(|i| self.sampled(LEARNING + i, size)).collect();
+        let rows: Result<Vec<Sampled>> = (0..rows).map(|i| self.boxes().sampled(LEARNING + i, size)).collect();
         let (ty, frames) = (self.archive.sample, self.frames());
         let samples = rows?;
         let samples = samples.iter().map(|row| &row.samples[..]);
         Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))
     }
 
-    pub(super) fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
+    fn pyramid(&self, order: &[Axis], stencil: Stencil) -> Pyramid {
         let ((growth, most), ghosts) = (GROWTHS[0], self.packing == Packing::Nested);
         Pyramid {
             order: order.to_vec(),
@@ -330,7 +337,7 @@ impl SchemeSelector<'_> {
     }
 
     /// Whether 32-bit floats are precise enough.
-    pub(super) fn single(&self) -> bool {
+    fn single(&self) -> bool {
         let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&self.promise.delta) && self.magnitude < MOST_SINGLE;
         normal && self.promise.delta >= self.magnitude * SINGLE
     }

@@ -1,14 +1,12 @@
 //! Boxes of a window's samples in which schemes are tried.
 
-use super::choose::SchemeSelector;
-use super::smoothness::AXES;
 use super::spread::evenly;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
-use wavesplat_core::codec::scheme::Stencil;
-use wavesplat_core::source::read_frames;
+use wavesplat_core::codec::scheme::Pyramid;
+use wavesplat_core::source::{Archive, FrameWindow, read_frames};
 
 /// The largest number of samples in all boxes, for blocks of `block` samples.
 pub(super) fn most_samples(block: usize) -> usize {
@@ -46,22 +44,33 @@ impl BoxSizes {
     }
 }
 
-impl SchemeSelector<'_> {
+/// Where boxes are taken from.
+pub(super) struct TrialBoxes<'a> {
+    pub(super) archive: &'a Archive,
+    /// The window's samples, channel by channel.
+    pub(super) channels: &'a [&'a dyn FrameWindow],
+    /// The most samples of all boxes.
+    pub(super) most: usize,
+    /// One of the pyramids that are tried.
+    pub(super) pyramid: Pyramid,
+}
+
+impl TrialBoxes<'_> {
     /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
     /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
-    pub(super) fn boxes(&self, sizes: BoxSizes) -> Result<Vec<Sampled>> {
-        let size = self.box_size(sizes);
+    pub(super) fn read(&self, sizes: BoxSizes) -> Result<Vec<Sampled>> {
+        let size = self.size(sizes);
         let volume = size.iter().product::<usize>();
-        let count = (self.voxels() / SHARE / volume).clamp(self.least_boxes(), MOST_BOXES);
+        let count = (self.voxels() / SHARE / volume).clamp(self.least(), MOST_BOXES);
         let count = count.min(self.most_voxels(sizes) / volume).max(1);
         (0..count).map(|i| self.sampled(i, size)).collect()
     }
 
     /// Voxels of a box along x, y, z.
-    pub(super) fn box_size(&self, sizes: BoxSizes) -> [usize; 3] {
-        let (most, least) = (self.most_voxels(sizes), self.least_boxes());
-        let sizes = sizes.edges().iter().map(|edge| self.archive.grid.dims.map(|n| n.min(*edge)));
-        sizes.into_iter().find(|size| least * size.iter().product::<usize>() <= most).unwrap_or([1; 3])
+    pub(super) fn size(&self, sizes: BoxSizes) -> [usize; 3] {
+        let (most, least) = (self.most_voxels(sizes), self.least());
+        let mut sizes = sizes.edges().iter().map(|edge| self.archive.grid.dims.map(|n| n.min(*edge)));
+        sizes.find(|size| least * size.iter().product::<usize>() <= most).unwrap_or([1; 3])
     }
 
     /// Voxels of all channels.
@@ -69,13 +78,19 @@ impl SchemeSelector<'_> {
         self.archive.grid.whole().voxels() * self.channels.len()
     }
 
-    fn least_boxes(&self) -> usize {
+    /// The number of frames in the window.
+    pub(super) fn frames(&self) -> usize {
+        self.channels[0].frames()
+    }
+
+    /// The least number of boxes.
+    fn least(&self) -> usize {
         LEAST_BOXES.max(self.channels.len())
     }
 
     /// The most voxels of all boxes.
     fn most_voxels(&self, sizes: BoxSizes) -> usize {
-        let most = if self.single() { self.most } else { self.most / 3 * 2 }; // double precision takes more memory
+        let most = if self.pyramid.single { self.most } else { self.most / 3 * 2 }; // double precision takes more memory
         let most = if sizes == BoxSizes::Small { most / 3 } else { most };
         (self.voxels() / LARGEST_SHARE).min(most / self.frames())
     }
@@ -85,7 +100,8 @@ impl SchemeSelector<'_> {
     pub(super) fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
         let dims = self.archive.grid.dims;
         // Blocks at far faces are followed by no other voxels. They are taken for every second box.
-        let outer = self.outer_size(size);
+        let ghosts = self.pyramid.ghost_nodes(size);
+        let outer = std::array::from_fn(|axis| size[axis] + ghosts[axis]); // the voxels that coding a box by any pyramid takes
         let ends = if number.is_multiple_of(2) { size } else { outer };
         let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
         let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
@@ -94,12 +110,6 @@ impl SchemeSelector<'_> {
         let window = self.channels[number % self.channels.len()];
         let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
         Ok(Sampled { size, outer, samples })
-    }
-
-    /// The voxels that coding a box by any pyramid takes.
-    fn outer_size(&self, size: [usize; 3]) -> [usize; 3] {
-        let ghosts = self.pyramid(&AXES, Stencil::Cubic).ghost_nodes(size);
-        std::array::from_fn(|axis| size[axis] + ghosts[axis])
     }
 }
 

@@ -35,7 +35,8 @@ impl<'a> Streams<'a> {
 
     fn collect(boxes: &[DenseCodes<'_>], bits: &'a mut Vec<u8>) -> Self {
         let mut streams = Self::new(bits, boxes);
-        boxes.iter().for_each(|of| streams.add(&of.contiguous(), of.at.extents));
+        let mut scratch = Vec::new();
+        boxes.iter().for_each(|of| streams.add(of.contiguous(&mut scratch), of.at.extents));
         streams
     }
 
