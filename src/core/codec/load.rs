@@ -61,6 +61,21 @@ impl Missing {
     }
 }
 
+/// The samples of a block, and the codec for them.
+#[derive(Clone, Copy)]
+pub(super) struct Source<'a> {
+    pub(super) codec: &'a WindowCodec,
+    pub(super) samples: BoxSamples<'a>,
+    pub(super) missing: &'a Missing,
+}
+
+impl Source<'_> {
+    /// The number of voxels.
+    pub(super) fn voxels(&self) -> usize {
+        self.samples.voxels()
+    }
+}
+
 /// Loads the series of a group of voxels. Missing samples are filled with the last present one, else the next, else
 /// zero.
 pub(super) fn load_group(

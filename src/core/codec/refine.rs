@@ -4,19 +4,18 @@
 //! The step is that of eq 25 times the scheme's coarseness, less a margin for rounding in 32-bit floats. With a
 //! coarseness above 1, rounding alone may miss the bound; samples that miss it are stored exactly.
 
-use super::box_samples::BoxSamples;
 use super::buffer::{Buffer, clear};
 use super::check::{Compared, Tally};
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::forward::forward;
-use super::load::{Missing, load_group};
+use super::lane_groups;
+use super::load::{Source, load_group};
 use super::pyramid::Nodes;
 use super::real::Real;
 use super::rows::count_nonzero;
 use super::screen::{self, Screen};
 use super::truncate::Group;
-use super::{WindowCodec, lane_groups};
 use crate::base::sample;
 use crate::base::vectors::dispatch;
 use crate::codec::bound::Measure;
@@ -78,19 +77,7 @@ impl<R: Real> SourceNodes<R> {
     }
 }
 
-/// The samples of a block, and the codec for them.
-#[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
-    pub(super) codec: &'a WindowCodec,
-    pub(super) samples: BoxSamples<'a>,
-    pub(super) missing: &'a Missing,
-}
-
 impl Source<'_> {
-    pub(super) fn voxels(&self) -> usize {
-        self.samples.voxels()
-    }
-
     /// Encodes the block, which covers `size` voxels, by a pyramid, from the samples of `outer`, which also has nodes that only
     /// predict, and the known nodes. Leaves the decoded nodes in `field`, and their codes in `codes`. None if the block must be stored
     /// exactly, or, above tier 0, without codes.

@@ -6,10 +6,10 @@ use super::box_samples::BoxSamples;
 use super::buffer::Buffer;
 use super::encode::listed;
 use super::error_weights::QuantizerSetup;
-use super::load::Missing;
+use super::load::{Missing, Source};
 use super::pyramid::Nodes;
 use super::real::Real;
-use super::refine::{Source, SourceNodes};
+use super::refine::SourceNodes;
 use wavesplat_format::Pyramid;
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
