@@ -34,6 +34,15 @@ impl Deref for SampleBytes<'_> {
     }
 }
 
+impl SampleBytes<'_> {
+    fn into_own(self) -> Buffer<u8> {
+        match self {
+            Self::Lent(samples) => samples.into(),
+            Self::Own(samples) => samples,
+        }
+    }
+}
+
 impl<'a> From<&'a [u8]> for SampleBytes<'a> {
     fn from(samples: &'a [u8]) -> Self {
         Self::Lent(samples)
@@ -85,19 +94,21 @@ impl BlockWithGhosts {
 
     /// The nodes of a block of a tier above 0, from what is known: those in the volume and, along axes that have a node behind it,
     /// the volume's last two planes of voxels. Those are extrapolated as for the blocks below.
-    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: &'a [u8]) -> SampleBytes<'a> {
+    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: SampleBytes<'a>) -> SampleBytes<'a> {
         if self.known == self.size {
-            return SampleBytes::Lent(samples);
+            return samples;
         }
         let mut known = self.known;
-        let mut nodes = Buffer::from(samples);
+        let mut nodes = samples.into_own();
         for axis in 0..3 {
             if known[axis] > self.size[axis] {
                 extrapolate(codec, &mut nodes, self.known, known, axis, known[axis] - 2);
                 known[axis] -= 1;
             }
         }
-        SampleBytes::Own(copied(codec.sample, &nodes, self.size, self.known, self.size))
+        move_together(codec.sample, codec.frames(), &mut nodes, self.known, self.size);
+        nodes.shorten(codec.frames() * self.size.iter().product::<usize>() * codec.sample.size());
+        SampleBytes::Own(nodes)
     }
 }
 
@@ -119,6 +130,15 @@ fn move_apart(ty: SampleType, frames: usize, samples: &mut [u8], from: [usize; 3
     for at in rows(frames, from).rev() {
         let start = each * first(from, at);
         samples.copy_within(start..start + from[0] * each, each * first(to, at)); // rows before it lie before its new place
+    }
+}
+
+/// Moves the samples of `to` voxels in an array of `from` voxels together.
+fn move_together(ty: SampleType, frames: usize, samples: &mut [u8], from: [usize; 3], to: [usize; 3]) {
+    let each = ty.size();
+    for at in rows(frames, to) {
+        let start = each * first(from, at);
+        samples.copy_within(start..start + to[0] * each, each * first(to, at)); // rows after it lie behind its new place
     }
 }
 

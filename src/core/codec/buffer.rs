@@ -55,6 +55,11 @@ impl<T: Pooled> Buffer<T> {
         size_of_val(&self.values[..])
     }
 
+    /// Keeps the first entries.
+    pub(super) fn shorten(&mut self, len: usize) {
+        self.len = self.len.min(len);
+    }
+
     /// Gives the memory back, and takes some for `len` entries with arbitrary values.
     pub fn renew(&mut self, len: usize) {
         *self = Self::default();

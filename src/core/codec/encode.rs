@@ -95,16 +95,16 @@ impl Encoder {
 
     /// Encodes a block of a tier above 0 that covers `size` voxels, and returns its decoded nodes for the blocks below. `of` are its
     /// nodes, and `samples` those that `BlockWithGhosts::coarse` makes them from.
-    pub fn coarse(
+    pub fn coarse<'a>(
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
         size: [usize; 3],
         of: BlockWithGhosts,
-        samples: &[u8],
+        samples: impl Into<SampleBytes<'a>>,
         above: Option<&Above>,
     ) -> wavesplat_format::Result<(EncodedBlock, Field<'static>)> {
-        let samples = of.coarse(codec, samples);
+        let samples = of.coarse(codec, samples.into());
         let missing = Missing::find(codec, &samples);
         let samples = BoxSamples::whole(codec.sample, &samples, of.size);
         let source = Source { codec, samples, missing: &missing };

@@ -250,13 +250,13 @@ impl<'a> Field<'a> {
         above: Option<&Above>,
         marked: &[bool],
     ) -> Vec<Change> {
-        let parts = passes.coded(codes);
+        let counts = passes.counts(codes);
         match &self.values {
             Values::Single(values) => {
-                passes.changes(&parts, step, codes, above.map(Above::singles), passes.field(values, marked))
+                passes.changes(&counts, step, codes, above.map(Above::singles), passes.field(values, marked))
             }
             Values::Double(values) => {
-                passes.changes(&parts, step, codes, above.map(Above::doubles), passes.field(values, marked))
+                passes.changes(&counts, step, codes, above.map(Above::doubles), passes.field(values, marked))
             }
             Values::Zero | Values::Codes { .. } => vec![Change::default(); PARTS],
         }

@@ -139,10 +139,9 @@ impl Source<'_> {
         let mut tally = tally?;
         let outliers = tally.take_outliers(&self.samples);
         let (listed, counts) = passes.list_coarse(codes);
-        // The directory lists no other parts.
-        let coded = counts.map(|count| count > 0);
-        let changes = passes.changes(&coded, step, &listed, known, passes.field(field, &marked));
-        let parts = Some(changes.iter().zip(counts).map(|(change, count)| change.stats(count)).collect());
+        let changes = passes.changes(&counts, step, &listed, known, passes.field(field, &marked));
+        let count = |part: usize| counts.iter().map(|counts| counts[part]).sum();
+        let parts = Some(changes.iter().enumerate().map(|(part, change)| change.stats(count(part))).collect());
         Some(Coded { step, marked, parts, dropped: tally.squared_error, outliers, tally })
     }
 

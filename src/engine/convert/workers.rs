@@ -189,7 +189,7 @@ fn encode_block(
     }
     let codec = window.codec.at(id.tier, 0);
     let nodes = plan.coarse_nodes(&codec, id);
-    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, &samples, above.as_ref());
+    let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
     let (block, field) = coded.map_err(bug)?;
     window.coarse.add(&codec, &block, field)?;
     Ok(Encoded { block, share: 0.0 })

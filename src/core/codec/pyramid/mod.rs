@@ -61,6 +61,9 @@ use within::Within;
 /// The number of level parts of a block.
 pub(crate) const PARTS: usize = Pyramid::PARTS as usize;
 
+/// The number of codes that are not zero in each level part.
+pub(crate) type Counts = [usize; PARTS];
+
 /// The passes over one block's field of `[x, y, z, k]` nodes, x fastest.
 #[derive(Debug)]
 pub(crate) struct PredictionPasses<'a> {
@@ -172,12 +175,15 @@ impl<'a> PredictionPasses<'a> {
     }
 
     /// Lists the codes on which the [changes](Self::changes) of level parts depend: those of all parts but the finest, which has most.
-    /// Returns the number of codes of each part, too.
-    pub(crate) fn list_coarse(&self, codes: &[i32]) -> (PooledCodes, [usize; PARTS]) {
+    /// Returns the [counts](Self::counts), too.
+    pub(crate) fn list_coarse(&self, codes: &[i32]) -> (PooledCodes, Vec<Counts>) {
         let finest = self.boxes.iter().map(|of| of.part).max().unwrap_or(0);
         let listed = self.list_parts(codes, finest);
-        let mut counts = std::array::from_fn(|part| self.count(part as u8, &listed));
-        counts[usize::from(finest)] = dispatch!(count_nonzero(codes)) - listed.count();
+        let mut counts = self.counts(&listed);
+        for (number, counts) in counts.iter_mut().enumerate() {
+            let all: usize = self.code_ranges(number).into_iter().map(|of| dispatch!(count_nonzero(&codes[of]))).sum();
+            counts[usize::from(finest)] = all - counts.iter().sum::<usize>();
+        }
         (listed, counts)
     }
 
@@ -342,28 +348,33 @@ impl<'a> PredictionPasses<'a> {
         self.pyramids * self.passes.iter().map(Pass::codes).sum::<usize>()
     }
 
-    /// The level parts with a code that is not zero.
-    pub(crate) fn coded(&self, codes: &SparseCodes) -> [bool; PARTS] {
-        std::array::from_fn(|part| self.count(part as u8, codes) > 0)
+    /// How many codes of each pyramid and level part are not zero.
+    pub(crate) fn counts(&self, codes: &SparseCodes) -> Vec<Counts> {
+        let (runs, mut counts) = (self.runs(), vec![Counts::default(); self.pyramids]);
+        for (of, runs) in self.boxes.iter().zip(runs) {
+            for (n, run) in runs.clone().enumerate() {
+                counts[n * self.pyramids / runs.len()][usize::from(of.part)] += codes.run(run).1.len();
+            }
+        }
+        counts
     }
 
-    /// The changes of a field from leaving out each part of `parts` and all finer ones. All k of the field are decoded; those that it
+    /// The changes of a field from leaving out each part with codes and all finer ones. All k of the field are decoded; those that it
     /// does not mark are zero.
     pub(crate) fn changes<R: Real>(
         &self,
-        parts: &[bool; PARTS],
+        counts: &[Counts],
         step: f64,
         codes: &SparseCodes,
         known: Option<Nodes<'_, R>>,
         field: Nodes<'_, R>,
     ) -> Vec<Change> {
         let mut changes = vec![Change::default(); PARTS];
-        if !parts.contains(&true) {
-            return changes;
-        }
-        let pyramids = field.values.chunks_exact(self.pyramid_nodes()).enumerate();
-        for (number, nodes) in pyramids.filter(|(number, _)| self.ks(*number).any(|k| field.has(k))) {
-            for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| parts[*part]) {
+        let coded: [bool; PARTS] = std::array::from_fn(|part| counts.iter().any(|counts| counts[part] > 0));
+        let pyramids = field.values.chunks_exact(self.pyramid_nodes()).zip(counts).enumerate();
+        for (number, (nodes, counts)) in pyramids.filter(|(number, _)| self.ks(*number).any(|k| field.has(k))) {
+            let is_changed = |part: usize| coded[part] && counts[part..].iter().any(|count| *count > 0);
+            for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| is_changed(*part)) {
                 if part == 0 && !self.has_known() {
                     dispatch!(add_changes_to_zero(change, nodes));
                 } else {

@@ -192,10 +192,11 @@ fn encoded_nodes_are_those_of_the_format() {
         assert_eq!(bits(&field), bits(&decoded), "{pyramid:?} {shape:?}");
         assert_eq!(codes, expected);
         let listed = passes.list(&codes);
+        assert_eq!(passes.list_coarse(&codes).1, passes.counts(&listed));
         let marked = passes.marked::<f64>(&listed, None);
         let nodes = Nodes { values: &field, size: [shape[0], shape[1], shape[2]], marked: Some(&marked) };
-        let coded = passes.changes(&passes.coded(&listed), 0.7, &listed, None, nodes);
-        let changes = passes.changes(&[true; PARTS], 0.7, &listed, None, nodes);
+        let coded = passes.changes(&passes.counts(&listed), 0.7, &listed, None, nodes);
+        let changes = passes.changes(&vec![[1; PARTS]; passes.counts(&listed).len()], 0.7, &listed, None, nodes);
         for part in 0..PARTS {
             let rest = twin_decoded(&pyramid, shape, 0.7, &codes, part);
             let largest = rest.iter().zip(&field).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
