@@ -62,21 +62,6 @@ fn count(codes: &[i32]) -> usize {
     dispatch!(count_nonzero(codes))
 }
 
-/// The nodes that a pyramid codes, `[k][voxel]`.
-#[derive(Default)]
-pub(super) struct SourceNodes<R: Real> {
-    pub(super) values: Buffer<R>,
-    /// An upper bound of the magnitudes of each k; infinite if none is known.
-    largest: Vec<R>,
-}
-
-impl<R: Real> SourceNodes<R> {
-    /// Whether each k may have nodes of this magnitude.
-    pub(super) fn marked(&self, magnitude: R) -> Vec<bool> {
-        self.largest.iter().map(|largest| *largest >= magnitude).collect()
-    }
-}
-
 impl Source<'_> {
     /// Encodes the block, which covers `size` voxels, by a pyramid, from the samples of `outer`, which also has nodes that only
     /// predict, and the known nodes. Leaves the decoded nodes in `field`, and their codes in `codes`. None if the block must be stored
@@ -96,20 +81,21 @@ impl Source<'_> {
         let weighing = QuantizerSetup::new(self.codec, &self.samples, self.missing.magnitude)?;
         let passes = self.codec.passes(pyramid, size);
         codes.renew(passes.codes());
-        field.renew(passes.nodes().iter().product());
+        let outer_nodes = self.codec.basis.coefficients() * outer.voxels();
+        field.renew(outer_nodes.max(passes.nodes().iter().product()));
         if let Some(zero) = self.zero(&weighing, field) {
             return Some(zero);
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
         let singles = outer.samples.singles().filter(|_| outer.plain() && outer.missing.count == 0);
-        let source: SourceNodes<R> = if singles.is_some() { SourceNodes::default() } else { outer.load(&weighing) };
         let encode = |step, field: &mut [R], codes: &mut [i32]| {
-            let (size, marked) = (outer.samples.size(), source.marked(passes.negligible(step)));
+            let size = outer.samples.size();
             let fits = match singles {
                 Some(values) => passes.encode(step, Nodes { values, size, marked: None }, known, field, codes),
                 None => {
-                    let nodes: Nodes<'_, R> = Nodes { values: &source.values, size, marked: Some(&marked) };
-                    passes.encode(step, nodes, known, field, codes)
+                    let largest = outer.load(&weighing, &mut field[..outer_nodes]);
+                    let marked = marked(&largest, passes.negligible(step));
+                    passes.encode_in_place(step, size, &marked, known, field, codes)
                 }
             };
             fits.then_some(())
@@ -134,10 +120,10 @@ impl Source<'_> {
                 }
             }
         }
-        drop(source); // its memory serves for the changes
         let Checked { marked, tally } = checked;
         let mut tally = tally?;
         let outliers = tally.take_outliers(&self.samples);
+        field.shorten(passes.nodes().iter().product());
         let (listed, counts) = passes.list_coarse(codes);
         let changes = passes.changes(&counts, step, &listed, known, passes.field(field, &marked));
         let count = |part: usize| counts.iter().map(|counts| counts[part]).sum();
@@ -186,18 +172,15 @@ impl Source<'_> {
         self.codec.scheme.basis == Basis::Samples && self.codec.bound.measure() == Measure::Largest
     }
 
-    /// Loads the nodes that the pyramid refines.
-    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup) -> SourceNodes<R> {
-        let mut values = Buffer::with_len(self.codec.basis.coefficients() * self.voxels());
-        let mut largest = vec![R::from_f64(f64::INFINITY); self.codec.basis.coefficients()];
+    /// Loads the nodes that the pyramid refines, `[k][voxel]`. Returns an upper bound of the magnitudes of each k; infinite if none is
+    /// known.
+    pub(super) fn load<R: Real>(&self, weighing: &QuantizerSetup, nodes: &mut [R]) -> Vec<R> {
         match self.codec.basis.rows().filter(|_| self.missing.count == 0) {
-            _ if self.plain() => self.load_samples(&mut values),
-            Some(rows) => {
-                largest = forward(rows, self.codec.sample, &self.samples.contiguous(), &mut values);
-            }
-            None => self.load_series(weighing, &mut values),
+            _ if self.plain() => self.load_samples(nodes),
+            Some(rows) => return forward(rows, self.codec.sample, &self.samples.contiguous(), nodes),
+            None => self.load_series(weighing, nodes),
         }
-        SourceNodes { values, largest }
+        vec![R::from_f64(f64::INFINITY); self.codec.basis.coefficients()]
     }
 
     /// Loads the samples as nodes; missing samples become NaN.
@@ -333,6 +316,11 @@ impl Source<'_> {
     pub(super) fn outliers_affordable(&self, outliers: usize) -> bool {
         outliers <= self.missing.all / MOST_OUTLIERS
     }
+}
+
+/// Whether each k may have nodes of this magnitude, by an upper bound of its nodes.
+pub(super) fn marked<R: Real>(largest: &[R], magnitude: R) -> Vec<bool> {
+    largest.iter().map(|largest| *largest >= magnitude).collect()
 }
 
 /// The estimate of outliers samples one group of series in this many. Rows of usual lengths are no multiple of it.

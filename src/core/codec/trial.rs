@@ -9,7 +9,7 @@ use super::error_weights::QuantizerSetup;
 use super::load::{Missing, Source};
 use super::pyramid::Nodes;
 use super::real::Real;
-use super::refine::SourceNodes;
+use super::refine::marked;
 use wavesplat_format::Pyramid;
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
@@ -19,8 +19,10 @@ pub struct Trial<'a, R: Real> {
     samples: SampleBytes<'a>,
     missing: Missing,
     weighing: Option<QuantizerSetup>,
-    /// The nodes of the box, and the nodes beyond it that may predict them.
-    nodes: SourceNodes<R>,
+    /// The nodes of the box, and the nodes beyond it that may predict them: `[k][voxel]`.
+    nodes: Buffer<R>,
+    /// An upper bound of the magnitudes of each k.
+    largest: Vec<R>,
     /// The voxels of these nodes along x, y, z.
     outer: [usize; 3],
 }
@@ -35,8 +37,9 @@ impl<'a, R: Real> Trial<'a, R> {
         let weighing = QuantizerSetup::new(codec, &own, missing.magnitude);
         let extended = BoxSamples::whole(codec.sample, &samples, outer);
         let extended = Source { codec, samples: extended, missing: &around };
-        let nodes = weighing.as_ref().map(|weighing| extended.load(weighing)).unwrap_or_default();
-        Self { size, samples, missing, weighing, nodes, outer }
+        let mut nodes = Buffer::with_len(codec.basis.coefficients() * extended.voxels());
+        let largest = weighing.as_ref().map(|weighing| extended.load(weighing, &mut nodes)).unwrap_or_default();
+        Self { size, samples, missing, weighing, nodes, largest, outer }
     }
 
     /// The samples of the box.
@@ -74,8 +77,8 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         let mut field = Buffer::with_len(passes.nodes().iter().product());
         let mut codes = Buffer::with_len(passes.codes());
-        let marked = self.nodes.marked(passes.negligible(step));
-        let nodes = Nodes { values: &self.nodes.values, size: self.outer, marked: Some(&marked) };
+        let marked = marked(&self.largest, passes.negligible(step));
+        let nodes: Nodes<'_, R> = Nodes { values: &self.nodes, size: self.outer, marked: Some(&marked) };
         if !passes.encode(step, nodes, None, &mut field, &mut codes) {
             return None;
         }

@@ -28,18 +28,52 @@ impl PredictionPasses<'_> {
         field: &mut [R],
         codes: &mut [i32],
     ) -> bool {
+        let each = source.size.iter().product::<usize>() * self.shape[3];
+        let has_nodes = |number| self.ks(number).any(|k| source.has(k));
+        let split = |number: usize, _: &[R], split: &mut [R]| {
+            self.split(&source.values[number * each..][..each], source.size, split);
+        };
+        self.encode_each(step, has_nodes, split, known, field, codes)
+    }
+
+    /// As [`Self::encode`]. The source's nodes lie in the field, with `size` along x, y, z, and are overwritten.
+    pub(crate) fn encode_in_place<R: Real>(
+        &self,
+        step: f64,
+        size: [usize; 3],
+        marked: &[bool],
+        known: Option<Nodes<'_, R>>,
+        field: &mut [R],
+        codes: &mut [i32],
+    ) -> bool {
+        let each = size.iter().product::<usize>() * self.shape[3];
+        let has_nodes = |number| self.ks(number).any(|k| marked[k]);
+        let split = |number: usize, field: &[R], split: &mut [R]| {
+            self.split(&field[number * each..][..each], size, split);
+        };
+        self.encode_each(step, has_nodes, split, known, field, codes)
+    }
+
+    /// Encodes one pyramid after the other. `split_source(number, field, nodes)` sorts the source's nodes of one.
+    fn encode_each<R: Real>(
+        &self,
+        step: f64,
+        has_nodes: impl Fn(usize) -> bool,
+        split_source: impl Fn(usize, &[R], &mut [R]),
+        known: Option<Nodes<'_, R>>,
+        field: &mut [R],
+        codes: &mut [i32],
+    ) -> bool {
         let mut fits = true;
         let ranges: Vec<_> = (0..self.pyramids).map(|number| self.code_ranges(number)).collect();
         let mut split = Buffer::with_len(self.codes() / self.pyramids);
-        let sources = source.values.chunks_exact(source.size.iter().product::<usize>() * self.shape[3]);
-        let fields = field.chunks_exact_mut(self.pyramid_nodes());
-        for (number, ((nodes, values), ranges)) in fields.zip(sources).zip(&ranges).enumerate() {
-            let ks = || self.ks(number);
-            if !ks().any(|k| source.has(k)) && known.is_none_or(|known| known.is_zero(ks())) {
+        for (number, ranges) in ranges.iter().enumerate() {
+            if !has_nodes(number) && known.is_none_or(|known| known.is_zero(self.ks(number))) {
                 apart(codes, ranges).into_iter().for_each(|codes| codes.fill(0));
                 continue;
             }
-            self.split(values, source.size, &mut split);
+            split_source(number, field, &mut split);
+            let nodes = &mut field[number * self.pyramid_nodes()..][..self.pyramid_nodes()]; // not behind the nodes split
             let (codes, known) = (apart(codes, ranges), known.map(|known| self.known(number, known)));
             let mut encoding = Encoding { split: &split, codes, passes: self.inverses(step), known, fits: true };
             self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);

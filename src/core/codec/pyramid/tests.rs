@@ -181,6 +181,9 @@ fn encoded_nodes_are_those_of_the_format() {
         let mut field = vec![f64::NAN; shape.iter().product()];
         let size = [outer[0], outer[1], outer[2]];
         assert!(passes.encode(0.7, Nodes { values: &source, size, marked: None }, None, &mut field, &mut codes));
+        let (mut in_place, mut same_codes) = (source.clone(), vec![99; codes.len()]);
+        assert!(passes.encode_in_place(0.7, size, &vec![true; shape[3]], None, &mut in_place, &mut same_codes));
+        assert_eq!((bits(&in_place[..field.len()]), &same_codes), (bits(&field), &codes), "{pyramid:?} {shape:?}");
         let mut expected = Vec::new();
         let decoded = twin(&pyramid, shape, |(pass, at), _, p| {
             let step = pyramid.step(0.7, pass.level);
