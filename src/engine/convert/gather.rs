@@ -401,7 +401,7 @@ fn window_bytes(job: &WindowJob, voxels: [usize; 3], sample: SampleType) -> usiz
 }
 
 /// Bytes of the rows that are read together for blocks of tiers above 0.
-const ROWS_BYTES: usize = 1 << 20;
+const ROWS_BYTES: usize = 1 << 10;
 
 /// The colour channels of a window; empty if samples are coded directly.
 fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {
