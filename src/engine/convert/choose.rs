@@ -118,13 +118,14 @@ impl SchemeSelector<'_> {
         }
         let tuned = promising.map(|tried| self.coarsest(tried, &trials));
         let mut best = tuned.reduce(fewer).ok_or_else(|| Error::setting("basis", "leaves nothing to choose from"))?;
-        for variants in [Self::orders, Self::stencils, Self::growths, Self::linear_orders] {
+        for variants in [Self::orders, Self::stencils, Self::growths] {
             best = self.or_variants(best, variants, &trials);
         }
-        let is_listed = self.is_listed(&best, &trials);
         trials.retain(|of| of.basis == best.scheme.basis);
-        let scheme = self.with_or_without_ghosts(best, &trials)?;
-        Ok(self.finished(scheme, is_listed, trials))
+        best = self.with_or_without_ghosts(best, &trials)?;
+        best = self.or_variants(best, Self::linear_orders, &trials);
+        let is_listed = self.is_listed(&best, &trials);
+        Ok(self.finished(best.scheme, is_listed, trials))
     }
 
     /// A scheme, or one of its variants that is clearly smaller.
@@ -138,21 +139,22 @@ impl SchemeSelector<'_> {
         others.reduce(fewer).filter(|other| other.bytes < best.bytes * CLEARLY).unwrap_or(best)
     }
 
-    /// A scheme with or without ghost nodes. Of small boxes, these are a larger share of the nodes than of blocks. So if small ones are
-    /// smaller without, large ones decide.
+    /// A scheme with or without ghost nodes, as tried in small boxes. Of these, ghost nodes are a larger share of the nodes than of
+    /// blocks. So if small boxes are smaller without, large ones decide.
     fn with_or_without_ghosts<R: Real + Send + Sync>(
         &self,
         best: Tried,
         trials: &[Transformed<'_, R>],
-    ) -> Result<Scheme> {
-        let of_small = self.or_variants(best.clone(), Self::ghosts, trials).scheme;
+    ) -> Result<Tried> {
+        let of_small = self.or_variants(best.clone(), Self::ghosts, trials);
         let sizes = [BoxSizes::Small, BoxSizes::Large].map(|sizes| self.boxes().size(sizes));
-        if of_small == best.scheme || sizes[0] == sizes[1] {
+        if of_small.scheme == best.scheme || sizes[0] == sizes[1] {
             return Ok(of_small);
         }
         let boxes = self.boxes().read(BoxSizes::Large)?;
         let trials = self.transformed::<R>(std::slice::from_ref(&best.scheme), &boxes);
-        Ok(self.or_variants(self.tried(best.scheme, &trials), Self::ghosts, &trials).scheme)
+        let of_large = self.or_variants(self.tried(best.scheme.clone(), &trials), Self::ghosts, &trials);
+        Ok(if of_large.scheme == best.scheme { best } else { of_small })
     }
 
     /// Whether most samples take less by lists of their values than by a scheme: then no blocks are above others.

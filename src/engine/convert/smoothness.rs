@@ -44,7 +44,7 @@ fn bits_left(sample: &impl Fn(usize) -> f64, dims: [usize; 4], axis: usize, delt
 }
 
 /// About this many nodes of a box are predicted along each axis.
-const NODES: usize = 1 << 13;
+const NODES: usize = 1 << 15;
 
 #[cfg(test)]
 mod tests {
