@@ -75,7 +75,7 @@ fn the_chosen_scheme_is_nearly_the_smallest() {
             let mut coded = |scheme: Scheme| {
                 let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, codec.bound, EDGE);
                 let id = BlockId::new(0, 0, 0);
-                size(&encoder.block(&codec, id, [EDGE; 3], &samples[..], None).unwrap().block.parts)
+                size(&encoder.block(&codec, id, [EDGE; 3], samples[..].into(), None).unwrap().block.parts)
             };
             let chosen = coded(Scheme::from_window(window));
             let least = schemes(window.pyramid.as_ref().unwrap()).into_iter().map(&mut coded).min().unwrap();

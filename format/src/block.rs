@@ -162,7 +162,7 @@ pub struct BlockStats {
     pub max: f64,
     /// Largest error of a sample, rounded up.
     pub reached: f64,
-    /// Sum of the squared errors of the samples; may overflow to infinity.
+    /// About the sum of the squared errors of the samples; may overflow to infinity.
     pub squared_error: f64,
     /// Energy of coefficients lost by dropping and quantisation; may overflow to infinity.
     pub dropped: f64,

@@ -172,7 +172,7 @@ fn encode_lanes<const N: usize>(symbols: &[u8], frequencies: &Frequencies, bits:
         start += u32::from(frequencies[symbol]);
         Encode::new(frequencies[symbol], start - u32::from(frequencies[symbol]), bits)
     });
-    let mut words = Words { words: vec![0; symbols.len() + 1], first: symbols.len() };
+    let mut words = Words { words: vec![0; symbols.len() + 1], next: symbols.len() };
     let mut states = [LOWEST; N];
     let (rounds, tail) = symbols.as_chunks::<N>();
     for (state, &symbol) in states.iter_mut().zip(tail).rev() {
@@ -189,29 +189,29 @@ fn encode_lanes<const N: usize>(symbols: &[u8], frequencies: &Frequencies, bits:
     out.extend(words.iter().flat_map(|word| word.to_le_bytes()));
 }
 
-/// Words that states gave up, from the last to the first. A symbol makes a state give up one at most.
+/// Words that states gave up, filled from the end, because a decoder takes the last one first. A symbol makes a state give up at most one.
 struct Words {
     words: Vec<u16>,
-    /// The place before the last one.
-    first: usize,
+    /// The place of the next word. Those behind it are taken.
+    next: usize,
 }
 
 impl Words {
-    /// The state that a symbol is packed in (eq 40), after `state` has given up 16 bits if it would overflow. Without branches, because a
+    /// Packs a symbol (eq 40). Returns the state, which first gives up 16 bits if it would overflow. It has no branches, because a
     /// processor could not predict them.
     #[inline(always)]
     fn push(&mut self, state: u32, symbol: &Encode, bits: u32) -> u32 {
-        self.words[self.first] = state as u16;
+        self.words[self.next] = state as u16;
         let is_large = state >= symbol.limit;
-        self.first -= usize::from(is_large);
+        self.next -= usize::from(is_large);
         let state = if is_large { state >> 16 } else { state };
         let quotient = (u64::from(state).wrapping_mul(symbol.reciprocal) >> (32 + bits)) as u32;
         state.wrapping_add(quotient.wrapping_mul(symbol.others)).wrapping_add(symbol.start)
     }
 
-    /// All of them, the first one first.
+    /// The words in the order in which a decoder takes them.
     fn all(&self) -> &[u16] {
-        &self.words[self.first + 1..]
+        &self.words[self.next + 1..]
     }
 }
 

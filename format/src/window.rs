@@ -65,7 +65,7 @@ pub struct Window {
     pub reached: f64,
     /// Largest share of its bound that any series uses, in the bound's own measure, rounded up; at most 1.
     pub share: f64,
-    /// Sum of the squared errors of the samples; may overflow to infinity.
+    /// About the sum of the squared errors of the samples; may overflow to infinity.
     pub squared_error: f64,
     /// Smallest decoded finite sample; infinity if there is none.
     pub min: f64,

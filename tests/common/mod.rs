@@ -97,7 +97,7 @@ pub(crate) fn stored_with_a_lie(
             let region = file.blocks.region(block);
             let bytes = read_frames(samples.as_ref(), 0..frames.len(), &region, file.sample()).unwrap();
             let id = BlockId::new(window, 0, block as u32);
-            let mut encoded = encoder.block(&codec, id, region.dims(), &bytes[..], None).unwrap().block;
+            let mut encoded = encoder.block(&codec, id, region.dims(), bytes[..].into(), None).unwrap().block;
             if (id.window, id.block) == place {
                 lie(&mut encoded, &mut metadata);
             }

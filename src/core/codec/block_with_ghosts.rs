@@ -14,12 +14,9 @@ pub struct BlockWithGhosts {
     pub known: [usize; 3],
 }
 
-/// The little-endian bytes of samples, frame by frame.
-#[derive(Debug)]
-pub enum SampleBytes<'a> {
-    /// Those of a caller.
+/// Samples of a caller, or a copy of some.
+pub(super) enum SampleBytes<'a> {
     Lent(&'a [u8]),
-    /// A copy of some, or those that a caller gave away: possibly with room for the voxels that a block is extended by.
     Own(Buffer<u8>),
 }
 
@@ -34,27 +31,6 @@ impl Deref for SampleBytes<'_> {
     }
 }
 
-impl SampleBytes<'_> {
-    fn into_own(self) -> Buffer<u8> {
-        match self {
-            Self::Lent(samples) => samples.into(),
-            Self::Own(samples) => samples,
-        }
-    }
-}
-
-impl<'a> From<&'a [u8]> for SampleBytes<'a> {
-    fn from(samples: &'a [u8]) -> Self {
-        Self::Lent(samples)
-    }
-}
-
-impl From<Buffer<u8>> for SampleBytes<'_> {
-    fn from(samples: Buffer<u8>) -> Self {
-        Self::Own(samples)
-    }
-}
-
 impl From<[usize; 3]> for BlockWithGhosts {
     /// A block without the samples around it.
     fn from(size: [usize; 3]) -> Self {
@@ -64,22 +40,20 @@ impl From<[usize; 3]> for BlockWithGhosts {
 
 impl BlockWithGhosts {
     /// The samples of `outer` voxels along x, y, z, at least as many as are known. Beyond the known voxels, the last
-    /// two planes are extrapolated linearly.
+    /// two planes are extrapolated linearly. Those of the known voxels may have room behind them, and then stay in place.
     pub(super) fn extended<'a>(
         &self,
         codec: &WindowCodec,
         outer: [usize; 3],
         samples: SampleBytes<'a>,
     ) -> SampleBytes<'a> {
-        if self.known == outer {
+        let (ty, mut known) = (codec.sample, self.known);
+        if known == outer {
             return samples;
         }
-        let (ty, mut known) = (codec.sample, self.known);
-        let room = codec.frames() * outer.iter().product::<usize>() * ty.size();
         let mut extended = match samples {
-            SampleBytes::Own(mut samples) if samples.len() == room => {
-                move_apart(ty, codec.frames(), &mut samples, known, outer);
-                samples
+            SampleBytes::Own(samples) if samples.len() == bytes(codec, outer) => {
+                move_apart(ty, codec.frames(), samples, known, outer)
             }
             samples => copied(ty, &samples, known, known, outer),
         };
@@ -94,12 +68,11 @@ impl BlockWithGhosts {
 
     /// The nodes of a block of a tier above 0, from what is known: those in the volume and, along axes that have a node behind it,
     /// the volume's last two planes of voxels. Those are extrapolated as for the blocks below.
-    pub(super) fn coarse<'a>(&self, codec: &WindowCodec, samples: SampleBytes<'a>) -> SampleBytes<'a> {
+    pub(super) fn coarse(&self, codec: &WindowCodec, mut nodes: Buffer<u8>) -> Buffer<u8> {
         if self.known == self.size {
-            return samples;
+            return nodes;
         }
         let mut known = self.known;
-        let mut nodes = samples.into_own();
         for axis in 0..3 {
             if known[axis] > self.size[axis] {
                 extrapolate(codec, &mut nodes, self.known, known, axis, known[axis] - 2);
@@ -107,9 +80,14 @@ impl BlockWithGhosts {
             }
         }
         move_together(codec.sample, codec.frames(), &mut nodes, self.known, self.size);
-        nodes.shorten(codec.frames() * self.size.iter().product::<usize>() * codec.sample.size());
-        SampleBytes::Own(nodes)
+        nodes.shorten(bytes(codec, self.size));
+        nodes
     }
+}
+
+/// Bytes of so many voxels in all frames.
+fn bytes(codec: &WindowCodec, voxels: [usize; 3]) -> usize {
+    codec.frames() * voxels.iter().product::<usize>() * codec.sample.size()
 }
 
 /// The samples of `size` voxels, frame by frame, from an array of `from` voxels in one of `to` voxels. The others are arbitrary.
@@ -125,12 +103,13 @@ pub(super) fn copied(ty: SampleType, samples: &[u8], size: [usize; 3], from: [us
 }
 
 /// Moves the samples of `from` voxels to their places in an array of `to` voxels. The others are arbitrary.
-fn move_apart(ty: SampleType, frames: usize, samples: &mut [u8], from: [usize; 3], to: [usize; 3]) {
+fn move_apart(ty: SampleType, frames: usize, mut samples: Buffer<u8>, from: [usize; 3], to: [usize; 3]) -> Buffer<u8> {
     let each = ty.size();
     for at in rows(frames, from).rev() {
         let start = each * first(from, at);
         samples.copy_within(start..start + from[0] * each, each * first(to, at)); // rows before it lie before its new place
     }
+    samples
 }
 
 /// Moves the samples of `to` voxels in an array of `from` voxels together.
@@ -190,4 +169,53 @@ fn rows(frames: usize, [_, y, z]: [usize; 3]) -> impl DoubleEndedIterator<Item =
 /// The number of a row's first sample in an array of so many voxels.
 fn first([x, y, z]: [usize; 3], row: RowOfFrame) -> usize {
     x * (row.y + y * (row.z + z * row.frame))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::codec::bound::{Bound, ErrorBound};
+    use crate::codec::scheme::{Basis, Scheme};
+
+    const FRAMES: usize = 3;
+
+    fn codec() -> WindowCodec {
+        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
+        WindowCodec::new(Scheme::along_time(Basis::Samples), FRAMES, SampleType::F32, bound, 8)
+    }
+
+    fn samples(voxels: [usize; 3]) -> Vec<u8> {
+        let values: Vec<f64> =
+            (0..FRAMES * voxels.iter().product::<usize>()).map(|i| (i * 7919 % 1009) as f64).collect();
+        let mut bytes = vec![0; 4 * values.len()];
+        sample::store(SampleType::F32, &values, &mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn blocks_extended_in_place_are_those_of_a_copy() {
+        let (codec, size) = (codec(), [8, 6, 4]);
+        let outer = size.map(|n| n + 1);
+        for case in 0..8 {
+            let known = std::array::from_fn(|axis| size[axis] + (case >> axis & 1));
+            let (of, samples) = (BlockWithGhosts { size, known }, samples(known));
+            let mut with_room = Buffer::with_len(bytes(&codec, outer));
+            with_room[..samples.len()].copy_from_slice(&samples);
+            let extended = of.extended(&codec, outer, SampleBytes::Own(with_room));
+            assert_eq!(extended[..], of.extended(&codec, outer, SampleBytes::Lent(&samples))[..]);
+            assert_eq!(copied(codec.sample, &extended, known, outer, known)[..], samples[..]);
+        }
+    }
+
+    #[test]
+    fn nodes_moved_together_are_those_of_a_copy() {
+        let (codec, known, size) = (codec(), [7, 6, 5], [6, 6, 4]);
+        let samples = samples(known);
+        let nodes = BlockWithGhosts { size, known }.coarse(&codec, samples[..].into());
+        assert_eq!(nodes.len(), bytes(&codec, size));
+        let mut expected = Buffer::from(&samples[..]);
+        extrapolate(&codec, &mut expected, known, known, 0, 5);
+        extrapolate(&codec, &mut expected, known, [6, 6, 5], 2, 3);
+        assert_eq!(nodes[..], copied(codec.sample, &expected, size, known, size)[..]);
+    }
 }

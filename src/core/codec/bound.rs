@@ -27,7 +27,7 @@
 //! ```
 //!
 //! One comparison decides a bound: `!(error <= allowed)`. The error is rounded up and the allowed value down, so
-//! rounding never hides a violation. No slack is added anywhere. The *share* of a sample is its error divided by its
+//! rounding never hides a violation. No slack is added to a bound. The *share* of a sample is its error divided by its
 //! allowed error. The share of a series is the largest, or the root mean square, of its samples' shares. A bound holds
 //! if all shares are at most 1.
 

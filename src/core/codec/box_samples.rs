@@ -96,11 +96,10 @@ impl<'a> BoxSamples<'a> {
 
     /// The largest magnitude. No sample may be missing.
     pub(super) fn magnitude(&self) -> f64 {
-        let (planes, rows) = (self.of[0] * self.of[1] * self.ty.size(), self.of[0] * self.ty.size());
-        let frames = self.bytes.chunks_exact(planes * self.of[2]);
-        let planes = frames.flat_map(|frame| frame.chunks_exact(planes).take(self.size[2]));
-        let [x, y, _] = self.size;
-        planes.fold(0.0, |most, plane| most.max(sample::magnitude_of_rows(self.ty, &plane[..rows * y], rows, x)))
+        let ([x, y, z], row) = (self.size, self.of[0] * self.ty.size());
+        let plane = row * self.of[1];
+        let planes = self.bytes.chunks_exact(plane * self.of[2]).flat_map(|frame| frame.chunks_exact(plane).take(z));
+        planes.fold(0.0, |most, plane| most.max(sample::magnitude_of_rows(self.ty, &plane[..row * y], row, x)))
     }
 
     /// Loads the series of `count` voxels, beginning with `first`: one lane for each frame. Unused elements of lanes are zero.

@@ -55,7 +55,7 @@ impl<T: Pooled> Buffer<T> {
         size_of_val(&self.values[..])
     }
 
-    /// Keeps the first entries.
+    /// Keeps the first `len` entries, and all of the memory.
     pub(super) fn shorten(&mut self, len: usize) {
         self.len = self.len.min(len);
     }

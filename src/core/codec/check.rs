@@ -46,8 +46,8 @@ pub(super) struct Tally {
     pub(super) share: f64,
     /// The indices of samples that must be stored exactly.
     pub(super) outliers: Vec<u32>,
-    /// Scratch: for each sample of some series, not a number if it may miss the bound.
-    is_clear: Vec<Lane>,
+    /// Scratch: for each sample of some series, NaN if it may miss the bound, else 0.
+    unclear: Vec<Lane>,
 }
 
 /// What holds for some series without missing samples.
@@ -65,17 +65,16 @@ pub(super) struct Ranges {
 impl Tally {
     pub(super) fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
-        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers: Vec::new(), is_clear: Vec::new() }
+        Self { min, max, reached: 0.0, squared_error: 0.0, share: 0.0, outliers: Vec::new(), unclear: Vec::new() }
     }
 
-    /// That of samples that are decoded to zeros within a bound of single samples.
+    /// The tally of samples that are all decoded to zero, within a bound of single samples.
     pub(super) fn of_zeros(codec: &WindowCodec, samples: &BoxSamples<'_>, missing: &Missing) -> Self {
         let mut tally = Self::new();
         if missing.count < missing.all as u64 {
-            tally.add(0.0, missing.magnitude);
-            tally.share = share(missing.magnitude, codec.bound.allowed(missing.magnitude)).min(1.0);
+            (tally.min, tally.max, tally.reached) = (0.0, 0.0, missing.magnitude);
+            tally.add_share(share(missing.magnitude, codec.bound.allowed(missing.magnitude)));
         }
-        tally.squared_error = 0.0;
         samples.for_each_run(|first, values| {
             let present = |at: usize| !missing.has(first + at);
             tally.squared_error += match missing.count {
@@ -123,8 +122,8 @@ impl Tally {
         unclear.for_each(|lane| self.add_one(codec, compared, lane, |t| index(t, lane)));
     }
 
-    /// Adds `count` series without missing samples under [`Bound::Pointwise`]. Vector code adds samples that are clearly within the bound, and
-    /// rounds their errors up once at the end.
+    /// Adds `count` series without missing samples under [`Bound::Pointwise`]. Vector code adds samples that are clearly within the
+    /// bound, and rounds their errors up once at the end.
     fn add_by_sample(
         &mut self,
         codec: &WindowCodec,
@@ -132,34 +131,19 @@ impl Tally {
         count: usize,
         index: impl Fn(usize, usize) -> Option<usize>,
     ) {
-        let mut is_clear = std::mem::take(&mut self.is_clear);
-        is_clear.resize(compared.source.len(), Lane::default());
-        let stats = LaneStats::of_clear_samples(codec, compared, &mut is_clear);
+        let mut unclear = std::mem::take(&mut self.unclear);
+        unclear.resize(compared.source.len(), Lane::default());
+        let stats = LaneStats::of_clear_samples(codec, compared, &mut unclear);
         for lane in 0..count {
             self.add_lane(codec, &stats, lane, compared.source.len());
             if stats.missing[lane].is_nan() {
-                let unclear = (0..is_clear.len()).filter(|t| is_clear[*t][lane].is_nan());
-                unclear.for_each(|t| self.add_unclear(codec, compared, t, lane, &index));
+                let present = (0..unclear.len())
+                    .filter(|t| unclear[*t][lane].is_nan())
+                    .filter_map(|t| Some((t, index(t, lane)?)));
+                present.for_each(|(t, index)| self.add_sample(index, &compared.sample(codec, t, lane)));
             }
         }
-        self.is_clear = is_clear;
-    }
-
-    /// Adds a sample that may miss the bound.
-    fn add_unclear(
-        &mut self,
-        codec: &WindowCodec,
-        compared: &Compared<'_>,
-        t: usize,
-        lane: usize,
-        index: &impl Fn(usize, usize) -> Option<usize>,
-    ) {
-        let of = compared.sample(codec, t, lane);
-        if let Some(index) = index(t, lane)
-            && self.add_unless_outlier(index, &of, false)
-        {
-            self.share = self.share.max(share(of.error, of.allowed).min(1.0));
-        }
+        self.unclear = unclear;
     }
 
     /// Adds the statistics of samples that are clearly within the bound.
@@ -195,23 +179,29 @@ impl Tally {
         index: impl Fn(usize) -> Option<usize>,
     ) {
         let present = (0..compared.source.len()).filter_map(|t| Some((index(t)?, compared.sample(codec, t, lane))));
-        let share = match codec.bound.measure() {
-            Measure::Largest => {
-                let kept = present.filter(|(index, of)| self.add_unless_outlier(*index, of, false));
-                kept.map(|(_, of)| share(of.error, of.allowed)).fold(0.0, f64::max)
+        if codec.bound.measure() == Measure::Largest {
+            return present.for_each(|(index, of)| self.add_sample(index, &of));
+        }
+        let mut present: Vec<_> = present.collect();
+        let holds = codec.bound.holds(present.iter().map(|(_, of)| (of.error, of.allowed)));
+        for (index, of) in &mut present {
+            if !self.add_unless_outlier(*index, of, holds) {
+                of.error = 0.0;
             }
-            Measure::RootMeanSquare => {
-                let mut present: Vec<_> = present.collect();
-                let holds = codec.bound.holds(present.iter().map(|(_, of)| (of.error, of.allowed)));
-                for (index, of) in &mut present {
-                    if !self.add_unless_outlier(*index, of, holds) {
-                        of.error = 0.0;
-                    }
-                }
-                codec.bound.share(present.iter().map(|(_, of)| (of.error, of.allowed)))
-            }
-        };
-        self.share = self.share.max(share.min(1.0)); // rounding up may exceed 1 although the bound holds
+        }
+        self.add_share(codec.bound.share(present.iter().map(|(_, of)| (of.error, of.allowed))));
+    }
+
+    /// Adds a sample under a bound of single samples, or notes an outlier.
+    fn add_sample(&mut self, index: usize, of: &ComparedSample) {
+        if self.add_unless_outlier(index, of, false) {
+            self.add_share(share(of.error, of.allowed));
+        }
+    }
+
+    /// Adds the share of samples that are within the bound: rounding up may exceed 1.
+    fn add_share(&mut self, share: f64) {
+        self.share = self.share.max(share.min(1.0));
     }
 
     /// Adds a sample of a series whose bound `holds`, or that is within the bound itself; or notes an outlier. Returns whether it is none.
@@ -225,6 +215,7 @@ impl Tally {
         }
         is_within
     }
+
     /// Takes the samples that must be stored exactly.
     pub(super) fn take_outliers(&mut self, samples: &BoxSamples<'_>) -> Outliers {
         let mut positions = std::mem::take(&mut self.outliers);
@@ -235,12 +226,21 @@ impl Tally {
     }
 }
 
+/// What a sample that is clearly within the bound keeps to.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    /// Its error is no larger.
+    error: f64,
+    /// It does not equal this value; NaN if none is declared.
+    declared: f64,
+}
+
 /// Statistics of [`LANES`] series, one entry for each.
 struct LaneStats {
     /// The range of the extracted samples.
     lo: Lane,
     hi: Lane,
-    /// NaN in lanes with a value that would be read as missing.
+    /// NaN in lanes with a value that would be read as missing, or that was not added.
     missing: Lane,
     largest: Lane,
     squares: Lane,
@@ -249,17 +249,17 @@ struct LaneStats {
 }
 
 impl LaneStats {
-    /// Those of the samples that are clearly within [`Bound::Pointwise`]. Others make [`Self::missing`] and their element of `is_clear`
-    /// not a number.
-    fn of_clear_samples(codec: &WindowCodec, compared: &Compared<'_>, is_clear: &mut [Lane]) -> Self {
+    /// Those of the samples that are clearly within [`Bound::Pointwise`]. Others make [`Self::missing`] and their element of `unclear` NaN.
+    fn of_clear_samples(codec: &WindowCodec, compared: &Compared<'_>, unclear: &mut [Lane]) -> Self {
         let mut stats = Self::empty();
-        let limits = [codec.bound.delta.next_down().next_down(), codec.missing_value.unwrap_or(f64::NAN)]; // NaN equals no value
+        let error = codec.bound.delta.next_down().next_down();
+        let limits = Limits { error, declared: codec.missing_value.unwrap_or(f64::NAN) };
         match codec.sample {
-            SampleType::F32 => dispatch!(compare_singles(&mut stats, compared, limits, is_clear)),
-            SampleType::F64 => dispatch!(compare_doubles(&mut stats, compared, limits, is_clear)),
+            SampleType::F32 => dispatch!(compare_singles(&mut stats, compared, limits, unclear)),
+            SampleType::F64 => dispatch!(compare_doubles(&mut stats, compared, limits, unclear)),
             ty => {
-                for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
-                    stats.add_clear(decoded, &sample::round_all(ty, decoded), source, limits, is_clear);
+                for ((decoded, source), unclear) in compared.decoded.iter().zip(compared.source).zip(unclear) {
+                    stats.add_clear(decoded, &sample::round_all(ty, decoded), source, limits, unclear);
                 }
             }
         }
@@ -283,20 +283,20 @@ impl LaneStats {
         Self { lo, hi, missing: zero, largest: zero, squares: zero, sums: zero }
     }
 
-    /// Adds the samples of a frame whose errors are at most the first of `limits`, and that do not equal the second.
+    /// Adds the samples of a frame that keep to the limits.
     #[inline(always)]
-    fn add_clear(&mut self, decoded: &Lane, rounded: &Lane, source: &Lane, limits: [f64; 2], is_clear: &mut Lane) {
+    fn add_clear(&mut self, decoded: &Lane, rounded: &Lane, source: &Lane, limits: Limits, unclear: &mut Lane) {
         for l in 0..LANES {
             let (a, b, v) = ((decoded[l] - source[l]).abs(), (rounded[l] - source[l]).abs(), rounded[l]);
             let e = if a > b { a } else { b };
-            let clear = (a <= limits[0]) & (b <= limits[0]) & (v.abs() < f64::INFINITY) & (v != limits[1]);
+            let clear = (a <= limits.error) & (b <= limits.error) & (v.abs() < f64::INFINITY) & (v != limits.declared);
             let (e, lo, hi) = if clear { (e, v, v) } else { (0.0, f64::INFINITY, f64::NEG_INFINITY) };
             self.largest[l] = if e > self.largest[l] { e } else { self.largest[l] };
             self.squares[l] += e * e;
             self.lo[l] = if lo < self.lo[l] { lo } else { self.lo[l] };
             self.hi[l] = if hi > self.hi[l] { hi } else { self.hi[l] };
-            is_clear[l] = if clear { 0.0 } else { f64::NAN };
-            self.missing[l] += is_clear[l];
+            unclear[l] = if clear { 0.0 } else { f64::NAN };
+            self.missing[l] += unclear[l];
         }
     }
 
@@ -331,17 +331,17 @@ fn sum_of_squares(values: &[f64]) -> f64 {
 }
 
 #[inline(always)]
-fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, limits: [f64; 2], is_clear: &mut [Lane]) {
-    for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
+fn compare_singles(stats: &mut LaneStats, compared: &Compared<'_>, limits: Limits, unclear: &mut [Lane]) {
+    for ((decoded, source), unclear) in compared.decoded.iter().zip(compared.source).zip(unclear) {
         let rounded = std::array::from_fn(|l| f64::from(decoded[l] as f32));
-        stats.add_clear(decoded, &rounded, source, limits, is_clear);
+        stats.add_clear(decoded, &rounded, source, limits, unclear);
     }
 }
 
 #[inline(always)]
-fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, limits: [f64; 2], is_clear: &mut [Lane]) {
-    for ((decoded, source), is_clear) in compared.decoded.iter().zip(compared.source).zip(is_clear) {
-        stats.add_clear(decoded, decoded, source, limits, is_clear);
+fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, limits: Limits, unclear: &mut [Lane]) {
+    for ((decoded, source), unclear) in compared.decoded.iter().zip(compared.source).zip(unclear) {
+        stats.add_clear(decoded, decoded, source, limits, unclear);
     }
 }
 

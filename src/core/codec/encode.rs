@@ -4,7 +4,7 @@
 //! 2. Without a pyramid, quantise, then drop the smallest coefficients of each series (eq 7). With a pyramid, code the
 //!    field pass by pass (eq 32).
 //! 3. Decode with the arithmetic of [`super::decode`], and compare with the source in the measure of the bound
-//!    (eq 21-23).
+//!    (eq 21-23). Series that surely change nothing but the sum of squared errors are compared in 32-bit floats (`screen`).
 //! 4. Store the samples that miss the bound exactly. Store all samples exactly if too many miss it, or if that is
 //!    smaller: their bytes, or if they have few values the places in a list of these.
 //!
@@ -49,19 +49,19 @@ impl Encoder {
         Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new() })
     }
 
-    /// Encodes a block of some voxels. `samples` are those of the known voxels, and may be given away with room for
+    /// Encodes a block of some voxels. `samples` are those of the known voxels, and may have room behind them for
     /// [`WindowCodec::outer_size`]; `above` is the block above, if there are tiers.
-    pub fn block<'a>(
+    pub fn block(
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
         of: impl Into<BlockWithGhosts>,
-        samples: impl Into<SampleBytes<'a>>,
+        samples: Buffer<u8>,
         above: Option<&Above>,
     ) -> wavesplat_format::Result<Encoded> {
         let of: BlockWithGhosts = of.into();
         let (size, around) = (of.size, codec.outer_size(of.size));
-        let extended = of.extended(codec, around, samples.into());
+        let extended = of.extended(codec, around, SampleBytes::Own(samples));
         let missing_around = Missing::find(codec, &extended);
         let outer = BoxSamples::whole(codec.sample, &extended, around);
         let outer = Source { codec, samples: outer, missing: &missing_around };
@@ -95,16 +95,16 @@ impl Encoder {
 
     /// Encodes a block of a tier above 0 that covers `size` voxels, and returns its decoded nodes for the blocks below. `of` are its
     /// nodes, and `samples` those that `BlockWithGhosts::coarse` makes them from.
-    pub fn coarse<'a>(
+    pub fn coarse(
         &mut self,
         codec: &WindowCodec,
         id: BlockId,
         size: [usize; 3],
         of: BlockWithGhosts,
-        samples: impl Into<SampleBytes<'a>>,
+        samples: Buffer<u8>,
         above: Option<&Above>,
     ) -> wavesplat_format::Result<(EncodedBlock, Field<'static>)> {
-        let samples = of.coarse(codec, samples.into());
+        let samples = of.coarse(codec, samples);
         let missing = Missing::find(codec, &samples);
         let samples = BoxSamples::whole(codec.sample, &samples, of.size);
         let source = Source { codec, samples, missing: &missing };
@@ -277,12 +277,16 @@ struct Parts {
     parts: Vec<EncodedPart>,
 }
 
+/// No more values of a list take a byte.
+const VALUES_OF_A_BYTE: usize = 8;
+
 /// The samples of a block by their values, if the file may list them and that may take less than `bytes`.
 pub(super) fn listed(codec: &WindowCodec, samples: &BoxSamples<'_>, bytes: usize) -> Option<Listed> {
     let [x, y, z] = samples.size();
     let may_pay = codec.lists && may_be_smaller(samples, bytes);
     let extents = [x, y, z, codec.frames()];
-    may_pay.then(|| Listed::new(samples.rows(), codec.sample.size(), extents, bytes)).flatten() // a value takes a byte
+    let most = bytes.saturating_mul(VALUES_OF_A_BYTE);
+    may_pay.then(|| Listed::new(samples.rows(), codec.sample.size(), extents, most)).flatten()
 }
 
 impl Parts {

@@ -47,7 +47,7 @@ fn keep_largest<R: Real>(sums: &[[R; VOXELS]], largest: &mut [R]) {
     }
 }
 
-/// The sums of products of some voxels, from the first factor of each row to the last.
+/// For each row, the sums over j of `row[j] * samples[j]` for some voxels, in the order of j.
 #[inline(always)]
 pub(super) fn products<R: Real>(rows: &[Vec<R>], samples: &[[R; VOXELS]], sums: &mut [[R; VOXELS]]) {
     let (some, last) = rows.as_chunks::<SIDE_BY_SIDE>();

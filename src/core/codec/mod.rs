@@ -1,8 +1,8 @@
 //! Codes and decodes one block within an error bound. Pure functions over slices; no I/O, no threads.
 //!
 //! [`encode`] transforms, truncates and quantises samples, decodes the result, and stores the samples that miss the
-//! bound exactly. [`decode`] is the only decoder: the encoder checks itself with it, and `extract`, `verify` and the
-//! renderer use it. Nothing here depends on the kind of transform along time, except that samples without one
+//! bound exactly. [`decode`] is the only decoder: `extract`, `verify` and the renderer use it, and the encoder checks itself with
+//! it, except for series that cannot change a block's statistics (`screen`). Nothing here depends on the kind of transform along time, except that samples without one
 //! (`Basis::Samples`) may also be predicted along time.
 
 pub mod bound;
@@ -66,7 +66,7 @@ pub fn make_spare<R: Real>(samples: usize, ty: SampleType) {
     } else {
         buffer::release_spare::<f32>(usize::MAX);
     }
-    drop([(); 3].map(|()| Buffer::<R>::with_len(samples))); // the nodes of the source, of the field, and of those above
+    drop([(); 3].map(|()| Buffer::<R>::with_len(samples))); // the nodes of the field, the same sorted by passes, and those above
     drop((Buffer::<i32>::with_len(samples), Buffer::<u8>::with_len(samples * ty.size())));
 }
 

@@ -38,7 +38,7 @@ pub trait Real:
 }
 
 /// A value that becomes a node.
-pub trait IntoNode<R>: Copy {
+pub(crate) trait IntoNode<R>: Copy {
     /// The node.
     fn node(self) -> R;
 }

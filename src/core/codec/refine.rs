@@ -88,13 +88,14 @@ impl Source<'_> {
         }
         let mut step = self.step::<R>(pyramid, &weighing)?;
         let singles = outer.samples.singles().filter(|_| outer.plain() && outer.missing.count == 0);
+        // Coding overwrites the source's nodes, which lie in the field. So each try loads them.
         let encode = |step, field: &mut [R], codes: &mut [i32]| {
             let size = outer.samples.size();
             let fits = match singles {
                 Some(values) => passes.encode(step, Nodes { values, size, marked: None }, known, field, codes),
                 None => {
                     let largest = outer.load(&weighing, &mut field[..outer_nodes]);
-                    let marked = marked(&largest, passes.negligible(step));
+                    let marked = passes.may_have_codes(step, &largest);
                     passes.encode_in_place(step, size, &marked, known, field, codes)
                 }
             };
@@ -318,11 +319,6 @@ impl Source<'_> {
     }
 }
 
-/// Whether each k may have nodes of this magnitude, by an upper bound of its nodes.
-pub(super) fn marked<R: Real>(largest: &[R], magnitude: R) -> Vec<bool> {
-    largest.iter().map(|largest| *largest >= magnitude).collect()
-}
-
 /// The estimate of outliers samples one group of series in this many. Rows of usual lengths are no multiple of it.
 const SAMPLING: usize = 3;
 
@@ -342,3 +338,63 @@ const FINER: f64 = 1.4;
 
 /// The margin subtracted from a step, relative to the largest sample, for rounding in 32-bit floats.
 const SINGLE_ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::sample::SampleType;
+    use crate::codec::WindowCodec;
+    use crate::codec::bound::{Bound, ErrorBound};
+    use crate::codec::box_samples::BoxSamples;
+    use crate::codec::load::Missing;
+    use crate::codec::scheme::Scheme;
+
+    /// Statistics of a block's series, each decoded and compared in doubles.
+    fn all_in_doubles(source: &Source<'_>, weighing: &QuantizerSetup, field: &[f32], marked: &[bool]) -> Tally {
+        let used = Used::new(source.codec.basis.as_ref(), marked);
+        let (mut tally, mut group) = (Tally::new(), Group::new(source.codec));
+        for (first, count) in lane_groups(source.voxels()) {
+            source.decode_group(weighing, field, &used, first, count, &mut group);
+            source.add(&group, first, count, &mut tally);
+        }
+        tally
+    }
+
+    #[test]
+    fn screened_series_give_the_statistics_of_all() {
+        let ([of, size], frames): ([[usize; 3]; 2], usize) = ([[23, 9, 5], [22, 9, 4]], 12);
+        let number = |i: usize| ((i as u32).wrapping_mul(0x9E37_79B1) >> 8) as f64 / f64::from(1 << 24) - 0.5;
+        let smooth = |i: usize, t: usize| (i as f64 / 90.0).sin() * (1.0 + t as f64 / 9.0);
+        let all: usize = of.iter().product();
+        for (declared, noise, ty) in
+            [(None, 0.01, SampleType::F32), (Some(0.0), 0.4, SampleType::F64), (None, 0.4, SampleType::F32)]
+        {
+            let values: Vec<f64> = (0..frames * all).map(|i| smooth(i % all, i / all) + noise * number(i)).collect();
+            let mut bytes = vec![0; values.len() * ty.size()];
+            sample::store(ty, &values, &mut bytes);
+            let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
+            for basis in [Basis::Learned, Basis::Samples] {
+                let functions = if basis == Basis::Learned { vec![20000; frames] } else { Vec::new() };
+                let mut codec =
+                    WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 8);
+                codec.missing_value = declared;
+                let samples = BoxSamples::new(ty, &bytes, of, size);
+                let around = Missing::find(&codec, &bytes);
+                let missing = Missing::within(&codec, &samples, &around);
+                assert_eq!(missing.count, 0);
+                let source = Source { codec: &codec, samples, missing: &missing };
+                let weighing = QuantizerSetup::new(&codec, &samples, missing.magnitude).expect("a bound");
+                let mut field = vec![0.0_f32; codec.basis.coefficients() * source.voxels()];
+                source.load(&weighing, &mut field);
+                field.iter_mut().enumerate().for_each(|(i, node)| *node += 0.15 * number(7 * i) as f32);
+                let marked = vec![true; codec.basis.coefficients()];
+                assert!(Screen::applies::<f32>(&source));
+                let screened = source.check_series(&weighing, &field, &marked).expect("few outliers");
+                let all = all_in_doubles(&source, &weighing, &field, &marked);
+                assert_eq!((&screened.outliers, screened.min, screened.max), (&all.outliers, all.min, all.max));
+                assert_eq!((screened.reached, screened.share), (all.reached, all.share));
+                assert!((screened.squared_error - all.squared_error).abs() <= 1e-5 * all.squared_error);
+            }
+        }
+    }
+}

@@ -1,15 +1,15 @@
-//! Finds the series of a block that change none of its statistics, by arithmetic in 32-bit floats. Only the others are decoded and
+//! Finds the series of a block that change none of its statistics but the sum of squared errors, by arithmetic in 32-bit floats. Only the others are decoded and
 //! compared in doubles.
 //!
 //! Let a sample be decoded in 32-bit floats from K coefficients c_k (eq 5), and in doubles, rounded to its type or not. Factors,
-//! products and sums are rounded by at most 2^-24 of their magnitude. So both differ by less than
+//! products and sums are rounded by at most 2^-24 of their magnitude. So the two differ by less than this:
 //!
 //! ```text
 //! slack = (2 K + 8) 2^-24 sum over k of max over t of |u_k(t)| max over the voxels of |c_k|
 //! ```
 //!
 //! A series changes nothing if its errors plus slack are no larger than an exact error of the same block, and its samples with
-//! slack lie between exact samples of it. The sum of squared errors alone takes what 32-bit floats give.
+//! slack lie between exact samples of it. The sum of squared errors takes what 32-bit floats give.
 
 use super::bound::Bound;
 use super::box_samples::BoxSamples;
@@ -33,11 +33,14 @@ pub(super) struct Screen<'a> {
     delta: f64,
     /// The largest difference of a sample and what it is loaded as.
     loading: f64,
-    /// `[k]`, `[frame]`, `[frame]`
+    /// The nodes of a run, for each k that is used.
     nodes: Vec<Row>,
+    /// Its source samples, frame by frame.
     source: Vec<Row>,
+    /// Its decoded samples, frame by frame.
     decoded: Vec<Row>,
     found: Found,
+    /// How far the exact errors and samples of the run may be off.
     slack: f64,
 }
 
@@ -145,25 +148,16 @@ fn rounding(magnitude: f64) -> f64 {
     if magnitude > 0.0 { magnitude * ROUNDING + f64::from(f32::from_bits(1)) } else { 0.0 }
 }
 
-/// The largest magnitude of a row; infinite if one is not finite.
+/// The largest magnitude of a row. Ignores NaN: a series with one is not known to be within the bound anyway.
 #[inline(always)]
 fn magnitude(row: &Row) -> f32 {
     let mut lanes = [0.0; WIDTH];
     for some in row.as_chunks::<WIDTH>().0 {
         for l in 0..WIDTH {
-            let magnitude = some[l].abs();
-            lanes[l] = if magnitude <= lanes[l] { lanes[l] } else { magnitude };
+            lanes[l] = if some[l].abs() > lanes[l] { some[l].abs() } else { lanes[l] };
         }
     }
-    lanes.into_iter().fold(0.0, |a, b| {
-        if b <= a {
-            a
-        } else if b.is_nan() {
-            f32::INFINITY
-        } else {
-            b
-        }
-    })
+    lanes.into_iter().fold(0.0, f32::max)
 }
 
 #[inline(always)]
@@ -226,7 +220,7 @@ mod tests {
         ) {
             let number = |i: usize| f64::from((i as u32 ^ seed).wrapping_mul(0x9E37_79B1) as i32) * 10.0_f64.powi(scale - 9);
             let ty = if is_double { SampleType::F64 } else { SampleType::F32 };
-            let functions = if learned { (0..3 * frames).map(|i| (number(i) / 10.0_f64.powi(scale)  * 9e3) as i16).collect() } else { Vec::new() };
+            let functions = if learned { (0..3 * frames).map(|i| (number(i) / 10.0_f64.powi(scale) * 9e3) as i16).collect() } else { Vec::new() };
             let basis = if learned { Basis::Learned } else { Basis::Samples };
             let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 10.0_f64.powi(scale) };
             let codec = WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 8);

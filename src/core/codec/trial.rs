@@ -9,7 +9,6 @@ use super::error_weights::QuantizerSetup;
 use super::load::{Missing, Source};
 use super::pyramid::Nodes;
 use super::real::Real;
-use super::refine::marked;
 use wavesplat_format::Pyramid;
 
 /// A box of samples, and its nodes for pyramids. All schemes with the same transform along time share them.
@@ -30,7 +29,7 @@ pub struct Trial<'a, R: Real> {
 impl<'a, R: Real> Trial<'a, R> {
     /// Pyramids may use the nodes of `outer` voxels.
     pub fn new(codec: &WindowCodec, of: BlockWithGhosts, outer: [usize; 3], samples: &'a [u8]) -> Self {
-        let (size, samples) = (of.size, of.extended(codec, outer, samples.into()));
+        let (size, samples) = (of.size, of.extended(codec, outer, SampleBytes::Lent(samples)));
         let around = Missing::find(codec, &samples);
         let own = BoxSamples::new(codec.sample, &samples, outer, size);
         let missing = Missing::within(codec, &own, &around);
@@ -77,8 +76,8 @@ impl<'a, R: Real> Trial<'a, R> {
         let passes = codec.passes(pyramid, self.size);
         let mut field = Buffer::with_len(passes.nodes().iter().product());
         let mut codes = Buffer::with_len(passes.codes());
-        let marked = marked(&self.largest, passes.negligible(step));
-        let nodes: Nodes<'_, R> = Nodes { values: &self.nodes, size: self.outer, marked: Some(&marked) };
+        let marked = passes.may_have_codes(step, &self.largest);
+        let nodes = Nodes { values: &self.nodes[..], size: self.outer, marked: Some(&marked) };
         if !passes.encode(step, nodes, None, &mut field, &mut codes) {
             return None;
         }
@@ -137,7 +136,7 @@ mod tests {
             let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 32);
             let mut encoder = Encoder::new(3).expect("a usual level");
             let id = BlockId::new(0, 0, 0);
-            let encoded = encoder.block(&codec, id, SIZE, &samples[..], None).expect("a small block");
+            let encoded = encoder.block(&codec, id, SIZE, samples[..].into(), None).expect("a small block");
             let stored: usize = encoded.block.parts.iter().map(|part| part.stored.len()).sum();
             let trial = Trial::<f32>::new(&codec, SIZE.into(), codec.outer_size(SIZE), &samples);
             let estimate = trial.bytes(&codec, &pyramid);

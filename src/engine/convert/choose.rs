@@ -3,13 +3,16 @@
 //! Candidates are a learned basis along time (eq 20) with a pyramid in space, pyramids in space and time (eq 32) whose passes
 //! along time come first or last, pyramids in space alone, frame by frame, and pyramids in time alone, voxel by voxel. The first
 //! suits slow change and noise, the next two fronts and moving things, space alone what moves by more than its size from frame to
-//! frame, time alone series that have nothing to do with each other. Axes come in the order of their smoothness ([`smoothness`](super::smoothness)). The promising candidates are tuned: first the
-//! step (eq 25 times a coarseness), then the order of passes, the stencil (eq 33), the growth of steps (eq 34) and ghost
-//! nodes.
+//! frame, time alone series that have nothing to do with each other. Axes come in the order of their smoothness
+//! ([`smoothness`](super::smoothness)).
+//!
+//! The promising candidates are tuned in small boxes: first the step (eq 25 times a coarseness), then the order of passes, the
+//! stencil (eq 33) and the growth of steps (eq 34). Larger boxes confirm that ghost nodes may be left out. With a linear stencil,
+//! all orders are tried again.
 
 use super::learn::learned_functions;
 use super::smoothness::{AXES, roughest_first};
-use super::trial_boxes::{BoxSizes, Sampled, TrialBoxes};
+use super::trial_boxes::{BoxSize, Sampled, TrialBoxes};
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -41,6 +44,8 @@ pub(super) struct SchemeSelector<'a> {
     pub(super) packing: Packing,
     /// Whether blocks may list their values.
     pub(super) lists: bool,
+    /// Whether the scheme need not be the best.
+    pub(super) is_rough: bool,
     /// The tiers above the blocks of a window with a pyramid.
     pub(super) tiers: u8,
     /// The previous window's scheme, if the choice may start from it.
@@ -53,6 +58,15 @@ struct Transformed<'a, R: Real> {
     codec: Mutex<WindowCodec>,
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
+}
+
+impl<'a, R: Real + Send + Sync> Transformed<'a, R> {
+    /// Some boxes under the transform of a codec.
+    fn new(codec: WindowCodec, boxes: &'a [Sampled]) -> Self {
+        let trial = |b: &'a Sampled| Trial::new(&codec, b.size, b.outer, &b.samples);
+        let boxes = boxes.par_iter().map(trial).collect();
+        Self { basis: codec.scheme.basis, boxes, codec: Mutex::new(codec) }
+    }
 }
 
 /// A scheme that was tried.
@@ -96,7 +110,7 @@ impl SchemeSelector<'_> {
     }
 
     fn smallest_of<R: Real + Send + Sync>(&self) -> Result<WindowCodec> {
-        let boxes = self.boxes().read(BoxSizes::Small)?;
+        let boxes = self.boxes().read(BoxSize::Small)?;
         let families = self.families(&self.order(&boxes))?;
         let (mut learned, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|f| f.basis == Basis::Learned);
         let mut trials = self.transformed::<R>(&others, &boxes);
@@ -112,8 +126,7 @@ impl SchemeSelector<'_> {
         if let Some(before) = self.before {
             let best = promising.clone().reduce(fewer);
             if let Some(best) = best.filter(|best| best.scheme.basis == before.basis) {
-                let is_listed = self.is_listed(&best, &trials);
-                return Ok(self.finished(best.scheme, is_listed, trials));
+                return Ok(self.finished(best, trials));
             }
         }
         let tuned = promising.map(|tried| self.coarsest(tried, &trials));
@@ -124,8 +137,7 @@ impl SchemeSelector<'_> {
         trials.retain(|of| of.basis == best.scheme.basis);
         best = self.with_or_without_ghosts(best, &trials)?;
         best = self.or_variants(best, Self::linear_orders, &trials);
-        let is_listed = self.is_listed(&best, &trials);
-        Ok(self.finished(best.scheme, is_listed, trials))
+        Ok(self.finished(best, trials))
     }
 
     /// A scheme, or one of its variants that is clearly smaller.
@@ -139,20 +151,22 @@ impl SchemeSelector<'_> {
         others.reduce(fewer).filter(|other| other.bytes < best.bytes * CLEARLY).unwrap_or(best)
     }
 
-    /// A scheme with or without ghost nodes, as tried in small boxes. Of these, ghost nodes are a larger share of the nodes than of
-    /// blocks. So if small boxes are smaller without, large ones decide.
+    /// A scheme with ghost nodes or without. Ghost nodes are a larger share of a small box than of a block, so they are left out only if
+    /// large boxes are smaller without them, too.
     fn with_or_without_ghosts<R: Real + Send + Sync>(
         &self,
         best: Tried,
         trials: &[Transformed<'_, R>],
     ) -> Result<Tried> {
         let of_small = self.or_variants(best.clone(), Self::ghosts, trials);
-        let sizes = [BoxSizes::Small, BoxSizes::Large].map(|sizes| self.boxes().size(sizes));
+        let sizes = [BoxSize::Small, BoxSize::Large].map(|size| self.boxes().voxels_of(size));
         if of_small.scheme == best.scheme || sizes[0] == sizes[1] {
             return Ok(of_small);
         }
-        let boxes = self.boxes().read(BoxSizes::Large)?;
-        let trials = self.transformed::<R>(std::slice::from_ref(&best.scheme), &boxes);
+        let Some(of_basis) = trials.iter().find(|of| of.basis == best.scheme.basis) else { return Ok(best) };
+        let boxes = self.boxes().read(BoxSize::Large)?;
+        let codec = self.with_scheme(&best.scheme, of_basis).clone(); // shares the functions
+        let trials = [Transformed::<R>::new(codec, &boxes)];
         let of_large = self.or_variants(self.tried(best.scheme.clone(), &trials), Self::ghosts, &trials);
         Ok(if of_large.scheme == best.scheme { best } else { of_small })
     }
@@ -169,12 +183,9 @@ impl SchemeSelector<'_> {
     }
 
     /// The codec of the chosen scheme.
-    fn finished<R: Real + Send + Sync>(
-        &self,
-        mut scheme: Scheme,
-        is_listed: bool,
-        trials: Vec<Transformed<'_, R>>,
-    ) -> WindowCodec {
+    fn finished<R: Real + Send + Sync>(&self, best: Tried, trials: Vec<Transformed<'_, R>>) -> WindowCodec {
+        let is_listed = self.is_listed(&best, &trials);
+        let mut scheme = best.scheme;
         let is_in_space = scheme.pyramid.as_ref().is_some_and(|p| p.order.iter().any(|axis| *axis != Axis::T));
         let tiers = if is_in_space && !is_listed { self.tiers } else { 0 };
         scheme.pyramid.iter_mut().for_each(|pyramid| pyramid.tiers = tiers);
@@ -197,10 +208,7 @@ impl SchemeSelector<'_> {
         let mut found: Vec<Transformed<'a, R>> = Vec::new();
         for scheme in schemes {
             if found.iter().all(|f| f.basis != scheme.basis) {
-                let codec = self.codec(scheme);
-                let trial = |b: &'a Sampled| Trial::new(&codec, b.size, b.outer, &b.samples);
-                let boxes = boxes.par_iter().map(trial).collect();
-                found.push(Transformed { basis: scheme.basis, boxes, codec: Mutex::new(codec) });
+                found.push(Transformed::new(self.codec(scheme), boxes));
             }
         }
         found
@@ -244,7 +252,7 @@ impl SchemeSelector<'_> {
     /// Where boxes are taken from.
     fn boxes(&self) -> TrialBoxes<'_> {
         let pyramid = self.pyramid(&AXES, Stencil::Cubic);
-        TrialBoxes { archive: self.archive, channels: self.channels, most: self.most, pyramid }
+        TrialBoxes { archive: self.archive, channels: self.channels, most: self.most, is_rough: self.is_rough, pyramid }
     }
 
     /// The number of frames in the window.

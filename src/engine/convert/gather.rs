@@ -237,6 +237,7 @@ impl<'a> WindowReader<'a> {
             promise,
             magnitude,
             most: if self.is_rough { most / ROUGH } else { most },
+            is_rough: self.is_rough,
             edge: self.plan.blocks.edges[0],
             packing: self.features.packing,
             lists: self.features.listed,
@@ -376,7 +377,7 @@ impl<'a> WindowReader<'a> {
         let sample = self.plan.colour_transform.map_or(self.archive.sample, |colour_transform| colour_transform.sample);
         let each = sample.size();
         let end = |places: &[usize]| places.last().map_or(0, |last| last + 1);
-        let mut samples = Buffer::with_len(window.frames() * zs.len() * ys.len() * xs.len() * each);
+        let mut samples = Buffer::with_len(window_bytes(job, [xs, ys, zs].map(Vec::len), sample));
         let (mut left, mut rows) = (samples.chunks_exact_mut(each), Vec::new());
         let row = (end(xs) - xs[0]) * each;
         let together = (ROWS_BYTES / (row << id.tier)).max(1);
@@ -400,8 +401,8 @@ fn window_bytes(job: &WindowJob, voxels: [usize; 3], sample: SampleType) -> usiz
     job.codec.frames() * voxels.iter().product::<usize>() * sample.size()
 }
 
-/// Bytes of the rows that are read together for blocks of tiers above 0.
-const ROWS_BYTES: usize = 1 << 10;
+/// Bytes of the rows that are read together for blocks of tiers above 0: each read of some sources takes long.
+const ROWS_BYTES: usize = 1 << 20;
 
 /// The colour channels of a window; empty if samples are coded directly.
 fn coloured<'a>(plan: &Plan<'a>, window: &'a dyn FrameWindow) -> Vec<ColourWindow<'a, &'a dyn FrameWindow>> {

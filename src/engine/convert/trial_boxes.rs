@@ -14,7 +14,7 @@ pub(super) fn most_samples(block: usize) -> usize {
 }
 
 /// Bytes that a choice takes: the samples, the nodes and the missing masks of two transforms, and the scratch of a
-/// trial. A node takes `each` bytes. Large boxes with one transform fit beside small ones.
+/// trial. A node takes `each` bytes. Large boxes have one transform beside that of small ones.
 pub(super) fn bytes(block: usize, sample: SampleType, each: usize) -> usize {
     most_samples(block) * (sample.size() + 2 * (each + 1) + each + size_of::<i32>())
 }
@@ -29,14 +29,14 @@ pub(super) struct Sampled {
 
 /// How large boxes are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum BoxSizes {
-    /// Large enough to compare transforms and steps.
+pub(super) enum BoxSize {
+    /// About a third of the samples: enough to compare transforms and steps.
     Small,
     /// Nearly as large as blocks.
     Large,
 }
 
-impl BoxSizes {
+impl BoxSize {
     /// Edges in voxels, the best one first: multiples of eight have coarse lattices like those of blocks.
     fn edges(self) -> &'static [usize] {
         let all = &[40, 32, 24, 16, 8, 4, 2, 1];
@@ -51,26 +51,27 @@ pub(super) struct TrialBoxes<'a> {
     pub(super) channels: &'a [&'a dyn FrameWindow],
     /// The most samples of all boxes.
     pub(super) most: usize,
-    /// One of the pyramids that are tried.
+    /// Whether the scheme need not be the best: then no large boxes follow small ones.
+    pub(super) is_rough: bool,
+    /// A pyramid with all ghost nodes that the tried ones may have.
     pub(super) pyramid: Pyramid,
 }
 
 impl TrialBoxes<'_> {
     /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
     /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
-    pub(super) fn read(&self, sizes: BoxSizes) -> Result<Vec<Sampled>> {
-        let size = self.size(sizes);
-        let volume = size.iter().product::<usize>();
-        let count = (self.voxels() / SHARE / volume).clamp(self.least(), MOST_BOXES);
-        let count = count.min(self.most_voxels(sizes) / volume).max(1);
-        (0..count).map(|i| self.sampled(i, size)).collect()
+    pub(super) fn read(&self, size: BoxSize) -> Result<Vec<Sampled>> {
+        let (voxels, most) = (self.voxels_of(size), self.most_voxels(size));
+        let volume = voxels.iter().product::<usize>();
+        let count = (self.voxels() / SHARE / volume).clamp(self.least(), MOST_BOXES).min(most / volume).max(1);
+        (0..count).map(|i| self.sampled(i, voxels)).collect()
     }
 
     /// Voxels of a box along x, y, z.
-    pub(super) fn size(&self, sizes: BoxSizes) -> [usize; 3] {
-        let (most, least) = (self.most_voxels(sizes), self.least());
-        let mut sizes = sizes.edges().iter().map(|edge| self.archive.grid.dims.map(|n| n.min(*edge)));
-        sizes.find(|size| least * size.iter().product::<usize>() <= most).unwrap_or([1; 3])
+    pub(super) fn voxels_of(&self, size: BoxSize) -> [usize; 3] {
+        let (most, least) = (self.most_voxels(size), self.least());
+        let mut boxes = size.edges().iter().map(|edge| self.archive.grid.dims.map(|n| n.min(*edge)));
+        boxes.find(|voxels| least * voxels.iter().product::<usize>() <= most).unwrap_or([1; 3])
     }
 
     /// Voxels of all channels.
@@ -89,9 +90,10 @@ impl TrialBoxes<'_> {
     }
 
     /// The most voxels of all boxes.
-    fn most_voxels(&self, sizes: BoxSizes) -> usize {
+    fn most_voxels(&self, size: BoxSize) -> usize {
         let most = if self.pyramid.single { self.most } else { self.most / 3 * 2 }; // double precision takes more memory
-        let most = if sizes == BoxSizes::Small { most / 3 } else { most };
+        let leaves_room = size == BoxSize::Small && !self.is_rough; // for large boxes
+        let most = if leaves_room { most / 3 } else { most };
         (self.voxels() / LARGEST_SHARE).min(most / self.frames())
     }
 

@@ -11,8 +11,14 @@ use std::ops::Range;
 use wavesplat_format::Pass;
 
 impl PredictionPasses<'_> {
+    /// Whether each k may have codes that are not zero without known nodes. `largest` are upper bounds of the magnitudes of its nodes.
+    pub(crate) fn may_have_codes<R: Real>(&self, step: f64, largest: &[R]) -> Vec<bool> {
+        let least = self.negligible(step);
+        largest.iter().map(|largest| *largest >= least).collect()
+    }
+
     /// Nodes of smaller magnitude get codes of zero, if they are predicted to be zero.
-    pub(crate) fn negligible<R: Real>(&self, step: f64) -> R {
+    fn negligible<R: Real>(&self, step: f64) -> R {
         let steps = self.passes.iter().map(|pass| self.pyramid.step(step, pass.level));
         R::from_f64(LESS_THAN_HALF * steps.fold(step, f64::min))
     }
@@ -73,7 +79,7 @@ impl PredictionPasses<'_> {
                 continue;
             }
             split_source(number, field, &mut split);
-            let nodes = &mut field[number * self.pyramid_nodes()..][..self.pyramid_nodes()]; // not behind the nodes split
+            let nodes = &mut field[number * self.pyramid_nodes()..][..self.pyramid_nodes()]; // it ends no later than the source's nodes that are already sorted
             let (codes, known) = (apart(codes, ranges), known.map(|known| self.known(number, known)));
             let mut encoding = Encoding { split: &split, codes, passes: self.inverses(step), known, fits: true };
             self.stages.refine(&vec![true; self.shape[3]], nodes, &mut encoding);

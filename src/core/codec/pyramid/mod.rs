@@ -373,6 +373,7 @@ impl<'a> PredictionPasses<'a> {
         let coded: [bool; PARTS] = std::array::from_fn(|part| counts.iter().any(|counts| counts[part] > 0));
         let pyramids = field.values.chunks_exact(self.pyramid_nodes()).zip(counts).enumerate();
         for (number, (nodes, counts)) in pyramids.filter(|(number, _)| self.ks(*number).any(|k| field.has(k))) {
+            // The directory lists only parts with codes. A pyramid without codes from a part on does not change.
             let is_changed = |part: usize| coded[part] && counts[part..].iter().any(|count| *count > 0);
             for (part, change) in changes.iter_mut().enumerate().filter(|(part, _)| is_changed(*part)) {
                 if part == 0 && !self.has_known() {

@@ -171,29 +171,24 @@ impl Stages {
         self.refine_stage(last, wanted, &coarse, out, correction);
     }
 
-    /// As [`Self::refine`], for all slices. Calls `visit(number, nodes)` for each as soon as it is complete.
+    /// As [`Self::refine`], for all slices. Calls `visit(number, nodes)` for each. Only one is in memory if the last stage is in space
+    /// alone.
     pub(super) fn for_each_slice<R: Real>(
         &self,
         correction: &mut impl Correction<R>,
         mut visit: impl FnMut(usize, &[R]),
     ) {
-        let all = self.lattices.last().map_or(0, |last| last.slices);
-        let coarse = self.refine_others(&vec![true; all], correction);
-        let each = self.lattices.last().map_or(0, Lattice::slice);
-        match self.stages.last() {
-            Some(last) if last.time.is_some() => {
-                let mut fine = self.buffer(all * each);
-                self.refine_stage(last, &vec![true; all], &coarse, &mut fine, correction);
-                fine.chunks_exact(each).enumerate().for_each(|(n, slice)| visit(n, slice));
-            }
-            Some(last) => {
-                let mut fine = self.buffer(each);
-                for (n, slice) in coarse.chunks_exact(coarse.len() / all).enumerate() {
-                    self.refine_slice(last, n, slice, &mut fine, correction);
-                    visit(n, &fine);
-                }
-            }
-            None => coarse.chunks_exact(each).enumerate().for_each(|(n, slice)| visit(n, slice)),
+        let (slices, each) = self.lattices.last().map_or((0, 0), |last| (last.slices, last.slice()));
+        let all = vec![true; slices];
+        let Some(last) = self.stages.last().filter(|stage| stage.time.is_none()) else {
+            let mut nodes = self.buffer(slices * each);
+            self.refine(&all, &mut nodes, correction);
+            return nodes.chunks_exact(each).enumerate().for_each(|(n, slice)| visit(n, slice));
+        };
+        let (coarse, mut fine) = (self.refine_others(&all, correction), self.buffer(each));
+        for (n, slice) in coarse.chunks_exact(coarse.len() / slices).enumerate() {
+            self.refine_slice(last, n, slice, &mut fine, correction);
+            visit(n, &fine);
         }
     }
 
