@@ -135,7 +135,8 @@ impl Tally {
         unclear.resize(compared.source.len(), Lane::default());
         let stats = LaneStats::of_clear_samples(codec, compared, &mut unclear);
         for lane in 0..count {
-            self.add_lane(codec, &stats, lane, compared.source.len());
+            let share = codec.bound.largest_share(&[stats.sums[lane]], compared.source.len());
+            self.add_lane(&stats, lane, share);
             if stats.missing[lane].is_nan() {
                 let present = (0..unclear.len())
                     .filter(|t| unclear[*t][lane].is_nan())
@@ -146,11 +147,11 @@ impl Tally {
         self.unclear = unclear;
     }
 
-    /// Adds the statistics of samples that are clearly within the bound.
-    fn add_lane(&mut self, codec: &WindowCodec, stats: &LaneStats, lane: usize, frames: usize) {
+    /// Adds the statistics of samples that are clearly within the bound, and their share.
+    fn add_lane(&mut self, stats: &LaneStats, lane: usize, share: f64) {
         let largest = if stats.largest[lane] > 0.0 { stats.largest[lane].next_up() } else { 0.0 };
         self.reached = self.reached.max(largest);
-        self.share = self.share.max(codec.bound.largest_share(&[stats.sums[lane]], frames));
+        self.share = self.share.max(share);
         self.squared_error += stats.squares[lane];
         (self.min, self.max) = (self.min.min(stats.lo[lane]), self.max.max(stats.hi[lane]));
     }
@@ -164,7 +165,7 @@ impl Tally {
             let share = codec.bound.largest_share(&[stats.sums[l]], compared.source.len());
             let clear = l < count && share <= 1.0 && !stats.missing[l].is_nan();
             if clear {
-                self.add_lane(codec, &stats, l, compared.source.len());
+                self.add_lane(&stats, l, share);
             }
             clear
         })
@@ -383,7 +384,8 @@ mod tests {
 
     #[test]
     fn vector_code_agrees_with_samples_one_by_one() {
-        let (frames, delta): (usize, f64) = (40, 3.0);
+        let frames = 40_usize;
+        let delta = 3.0_f64;
         let number = |i: usize| ((i * 7919) % 1013) as f64 / 7.0 - 50.0;
         let lanes =
             |first: usize| (0..frames).map(|t| std::array::from_fn(|l| number(first + t * LANES + l))).collect();

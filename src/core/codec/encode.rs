@@ -277,7 +277,7 @@ struct Parts {
     parts: Vec<EncodedPart>,
 }
 
-/// No more values of a list take a byte.
+/// So many values of a list take at least a byte.
 const VALUES_OF_A_BYTE: usize = 8;
 
 /// The samples of a block by their values, if the file may list them and that may take less than `bytes`.

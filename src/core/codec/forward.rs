@@ -31,9 +31,9 @@ pub(super) fn forward<R: Real>(rows: &[Vec<f64>], ty: SampleType, samples: &[u8]
     largest
 }
 
-/// Replaces each number by the largest magnitude of the sums, if that is larger.
+/// Replaces each number by the largest magnitude of its row of sums, if that is larger. Ignores NaN.
 #[inline(always)]
-fn keep_largest<R: Real>(sums: &[[R; VOXELS]], largest: &mut [R]) {
+pub(super) fn keep_largest<R: Real>(sums: &[[R; VOXELS]], largest: &mut [R]) {
     for (sums, largest) in sums.iter().zip(largest) {
         let mut lanes = [*largest; WIDTH];
         for sums in sums.as_chunks::<WIDTH>().0 {

@@ -362,7 +362,9 @@ mod tests {
 
     #[test]
     fn screened_series_give_the_statistics_of_all() {
-        let ([of, size], frames): ([[usize; 3]; 2], usize) = ([[23, 9, 5], [22, 9, 4]], 12);
+        let of = [23_usize, 9, 5];
+        let size = [22, 9, 4];
+        let frames = 12;
         let number = |i: usize| ((i as u32).wrapping_mul(0x9E37_79B1) >> 8) as f64 / f64::from(1 << 24) - 0.5;
         let smooth = |i: usize, t: usize| (i as f64 / 90.0).sin() * (1.0 + t as f64 / 9.0);
         let all: usize = of.iter().product();

@@ -15,7 +15,7 @@ use super::bound::Bound;
 use super::box_samples::BoxSamples;
 use super::check::Ranges;
 use super::field::Used;
-use super::forward::products;
+use super::forward::{keep_largest, products};
 use super::load::Source;
 use super::real::Real;
 use crate::base::sample::SampleType;
@@ -135,10 +135,11 @@ impl Functions {
         Self { columns, largest }
     }
 
-    /// The slack of samples that are decoded from some nodes.
+    /// The slack of samples that are decoded from some nodes. A series with NaN is never within the bound, so the slack ignores it.
     fn slack(&self, nodes: &[Row]) -> f64 {
-        let sum: f64 =
-            nodes.iter().zip(&self.largest).map(|(row, most)| most * f64::from(dispatch!(magnitude(row)))).sum();
+        let mut magnitudes = vec![0.0; nodes.len()];
+        dispatch!(keep_largest(nodes, &mut magnitudes[..]));
+        let sum: f64 = magnitudes.iter().zip(&self.largest).map(|(of_nodes, most)| most * f64::from(*of_nodes)).sum();
         if sum > 0.0 { (2 * nodes.len() + 8) as f64 * ROUNDING * (sum + UNDERFLOW) } else { 0.0 }
     }
 }
@@ -146,18 +147,6 @@ impl Functions {
 /// The most that numbers up to a magnitude lose when they become 32-bit floats.
 fn rounding(magnitude: f64) -> f64 {
     if magnitude > 0.0 { magnitude * ROUNDING + f64::from(f32::from_bits(1)) } else { 0.0 }
-}
-
-/// The largest magnitude of a row. Ignores NaN: a series with one is not known to be within the bound anyway.
-#[inline(always)]
-fn magnitude(row: &Row) -> f32 {
-    let mut lanes = [0.0; WIDTH];
-    for some in row.as_chunks::<WIDTH>().0 {
-        for l in 0..WIDTH {
-            lanes[l] = if some[l].abs() > lanes[l] { some[l].abs() } else { lanes[l] };
-        }
-    }
-    lanes.into_iter().fold(0.0, f32::max)
 }
 
 #[inline(always)]

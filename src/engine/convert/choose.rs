@@ -163,7 +163,7 @@ impl SchemeSelector<'_> {
         if of_small.scheme == best.scheme || sizes[0] == sizes[1] {
             return Ok(of_small);
         }
-        let Some(of_basis) = trials.iter().find(|of| of.basis == best.scheme.basis) else { return Ok(best) };
+        let Some(of_basis) = of_basis(&best.scheme, trials) else { return Ok(best) };
         let boxes = self.boxes().read(BoxSize::Large)?;
         let codec = self.with_scheme(&best.scheme, of_basis).clone(); // shares the functions
         let trials = [Transformed::<R>::new(codec, &boxes)];
@@ -173,9 +173,7 @@ impl SchemeSelector<'_> {
 
     /// Whether most samples take less by lists of their values than by a scheme: then no blocks are above others.
     fn is_listed<R: Real + Send + Sync>(&self, tried: &Tried, trials: &[Transformed<'_, R>]) -> bool {
-        let Some(of_basis) = trials.iter().find(|b| b.basis == tried.scheme.basis).filter(|_| self.lists) else {
-            return false;
-        };
+        let Some(of_basis) = of_basis(&tried.scheme, trials).filter(|_| self.lists) else { return false };
         let codec = self.with_scheme(&tried.scheme, of_basis);
         let boxes = || of_basis.boxes.iter().zip(&tried.of_boxes);
         let listed = boxes().filter(|(of_box, bytes)| of_box.listed_bytes(&codec, **bytes).is_some());
@@ -237,8 +235,7 @@ impl SchemeSelector<'_> {
 
     /// A scheme with its estimated bytes.
     fn tried<R: Real + Send + Sync>(&self, scheme: Scheme, trials: &[Transformed<'_, R>]) -> Tried {
-        let of_basis = trials.iter().find(|b| b.basis == scheme.basis);
-        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis) else {
+        let (Some(pyramid), Some(of_basis)) = (&scheme.pyramid, of_basis(&scheme, trials)) else {
             return Tried { scheme, bytes: f64::INFINITY, of_boxes: Vec::new() };
         };
         let codec = &*self.with_scheme(&scheme, of_basis);
@@ -425,6 +422,11 @@ impl SchemeSelector<'_> {
         codec.lists = self.lists;
         codec
     }
+}
+
+/// The transform along time of a scheme.
+fn of_basis<'t, 'a, R: Real>(scheme: &Scheme, trials: &'t [Transformed<'a, R>]) -> Option<&'t Transformed<'a, R>> {
+    trials.iter().find(|of| of.basis == scheme.basis)
 }
 
 /// Bytes that describe the functions of a scheme.

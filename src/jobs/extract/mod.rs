@@ -290,7 +290,7 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// The blocks that need whole blocks above: all but those of which only a tiny part is decoded.
+    /// The blocks whose blocks above must be decoded whole. A block of which only a tiny part is decoded needs parts of them.
     fn sharing<'e>(
         &self,
         codec: &WindowCodec,
