@@ -12,13 +12,26 @@ use crate::planes::{bitmap_len, pack_bits, pack_planes, unpack_bits, unpack_plan
 /// codes follows, then `w` (1 to 4) byte planes of their zig-zag values minus 1; `w` is the least width that holds the
 /// largest of them.
 pub fn pack_codes(codes: &[i32], out: &mut Vec<u8>) {
-    let values: Vec<u32> = codes.iter().filter(|&&c| c != 0).map(|&c| zigzag(c) - 1).collect();
-    let Some(&largest) = values.iter().max() else { return out.push(0) };
-    let width = width_of(largest);
+    let largest = codes.iter().map(|&code| zigzag(code)).max().unwrap_or(0);
+    if largest == 0 {
+        return out.push(0);
+    }
+    let width = width_of(largest - 1);
     out.push(width as u8);
-    pack_bits(codes.iter().map(|&c| c != 0), out);
-    for plane in 0..width {
-        out.extend(values.iter().map(|value| (value >> (8 * plane)) as u8));
+    pack_bits(codes, |code| code != 0, out);
+    (0..width).for_each(|plane| pack_nonzero(codes, |code| ((zigzag(code).wrapping_sub(1)) >> (8 * plane)) as u8, out));
+}
+
+/// Appends a byte of each code that is not zero.
+fn pack_nonzero(codes: &[i32], byte_of: impl Fn(i32) -> u8, out: &mut Vec<u8>) {
+    for codes in codes.chunks(64).filter(|codes| codes.iter().fold(0, |any, code| any | code) != 0) {
+        let (start, mut count) = (out.len(), 0);
+        out.resize(start + codes.len(), 0);
+        for &code in codes {
+            out[start + count] = byte_of(code); // overwritten by the next if the code is zero
+            count += usize::from(code != 0);
+        }
+        out.truncate(start + count);
     }
 }
 
@@ -131,7 +144,7 @@ fn ascend(gaps: &[u8], total: usize) -> ParseResult<Vec<u32>> {
 /// Appends a bitmap of the missing samples (`mask` is indexed by `frame * voxels + voxel`), then `sample_size` byte planes
 /// of these samples, given as little-endian bytes in the same order.
 pub fn pack_missing(mask: &[bool], samples: &[u8], sample_size: usize, out: &mut Vec<u8>) {
-    pack_bits(mask.iter().copied(), out);
+    pack_bits(mask, |missing| missing, out);
     pack_planes(samples, sample_size, out);
 }
 

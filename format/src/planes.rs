@@ -5,13 +5,18 @@ pub(crate) fn bitmap_len(total: usize) -> usize {
     total.div_ceil(8)
 }
 
-/// Appends a bitmap, least significant bit first, padding bits zero.
-pub(crate) fn pack_bits(bits: impl ExactSizeIterator<Item = bool>, out: &mut Vec<u8>) {
-    let start = out.len();
-    out.resize(start + bitmap_len(bits.len()), 0);
-    for (i, bit) in bits.enumerate() {
-        out[start + i / 8] |= u8::from(bit) << (i % 8);
+/// Appends a bitmap of which values are set, least significant bit first, padding bits zero.
+pub(crate) fn pack_bits<T: Copy>(values: &[T], is_set: impl Fn(T) -> bool, out: &mut Vec<u8>) {
+    let (bytes, last) = values.as_chunks::<8>();
+    out.extend(bytes.iter().map(|values| byte_of(values.map(|value| u8::from(is_set(value))))));
+    if !last.is_empty() {
+        out.push(byte_of(std::array::from_fn(|i| last.get(i).map_or(0, |value| u8::from(is_set(*value))))));
     }
+}
+
+/// The byte with these bits, each 0 or 1. The product moves bit n from the lowest place of byte n to place n of the highest byte.
+fn byte_of(bits: [u8; 8]) -> u8 {
+    (u64::from_le_bytes(bits).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
 }
 
 /// The first `total` bits of a bitmap. Panics if it is shorter.

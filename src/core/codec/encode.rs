@@ -18,11 +18,15 @@ use super::check::Tally;
 use super::codes::Codes;
 use super::error_weights::QuantizerSetup;
 use super::field::{Above, Field, Stored};
+use super::group::Group;
 use super::listed::may_be_smaller;
 use super::load::{Missing, Source, load_group};
 use super::refine::Coded;
-use super::truncate::Group;
+use super::rows::count_nonzero;
+use super::truncate::Truncation;
 use super::{WindowCodec, lane_groups};
+use crate::base::vectors::dispatch;
+use crate::wavelet::{LANES, Lane};
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Listed, PartKind, PartStats};
 use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
 
@@ -141,16 +145,18 @@ impl Encoder {
         let &Source { codec, ref samples, missing, .. } = block;
         let voxels = block.voxels();
         let weighing = QuantizerSetup::new(codec, samples, missing.magnitude)?;
+        if let Some(zero) = block.zero_by_sample() {
+            return Some(zero);
+        }
         let step = weighing.step;
         self.codes.renew(codec.basis.coefficients() * voxels);
-        let mut group = Group::new(codec);
+        let (mut group, mut truncation) = (Group::new(codec), Truncation::new(codec, step));
         let (mut dropped, mut tally) = (0.0, Tally::new());
         for (first, count) in lane_groups(voxels) {
             load_group(codec, &weighing, samples, missing, first, count, &mut group);
-            if !group.quantise(codec, step) {
+            if !truncation.code(&mut group) {
                 return None;
             }
-            group.truncate(codec, step);
             dropped += self.keep_codes(&group, step, voxels, first, count);
             block.check(&group, first, count, &mut tally)?;
         }
@@ -158,18 +164,16 @@ impl Encoder {
         Some(Coded { step, marked, parts: None, dropped, outliers: tally.take_outliers(samples), tally })
     }
 
-    /// Writes a group's kept codes, k-major. Returns the energy lost by dropping and rounding.
+    /// Writes a group's codes, k-major. Returns the energy lost by dropping and rounding.
     fn keep_codes(&mut self, group: &Group, step: f64, voxels: usize, first: usize, count: usize) -> f64 {
-        let mut lost = 0.0;
-        for (k, coefficients) in group.coefficients.iter().enumerate() {
-            let codes = group.kept(k);
-            self.codes[k * voxels + first..][..count].copy_from_slice(&codes[..count]);
-            for (c, code) in coefficients.iter().zip(codes).take(count) {
-                let error = c - f64::from(code) * step;
-                lost += error * error;
+        for (k, codes) in group.codes.iter().enumerate() {
+            let kept = &mut self.codes[k * voxels + first..][..count];
+            match kept.first_chunk_mut() {
+                Some(kept) => *kept = *codes,
+                None => kept.copy_from_slice(&codes[..count]),
             }
         }
-        lost
+        dispatch!(lost_energy(&group.coefficients[..], &group.codes[..], step))[..count].iter().sum()
     }
 
     /// The parts of a block coded by coefficients.
@@ -179,12 +183,11 @@ impl Encoder {
         let mut parts = Vec::new();
         for level in 0..codec.parts() as u8 {
             clear(&mut self.raw);
-            let stats = match (&coded.parts, &passes) {
-                (Some(parts), Some((packing, passes))) => {
-                    let stats = parts[usize::from(level)];
-                    if stats.count > 0 {
-                        packing.pack(&passes.part_of(level, &self.codes), &mut self.raw);
-                    }
+            let known = coded.parts.as_ref().map(|parts| parts[usize::from(level)]);
+            let stats = match (known, &passes) {
+                (Some(stats), _) if stats.count == 0 => stats,
+                (Some(stats), Some((packing, passes))) => {
+                    packing.pack(&passes.part_of(level, &self.codes), &mut self.raw);
                     stats
                 }
                 _ => {
@@ -316,12 +319,34 @@ impl Parts {
 
 /// The count, energy and largest of the coefficients that codes stand for.
 fn code_stats(codes: &[i32], step: f64) -> PartStats {
-    let mut stats = PartStats { count: 0, energy: 0.0, largest: 0.0 };
-    for code in codes.iter().filter(|c| **c != 0) {
-        let c = f64::from(*code) * step;
-        stats.count += 1;
-        stats.energy += c * c;
-        stats.largest = stats.largest.max(c.abs());
+    let energy = dispatch!(energy(codes, step));
+    let largest = codes.iter().map(|code| code.unsigned_abs()).max().unwrap_or(0);
+    PartStats { count: dispatch!(count_nonzero(codes)) as u64, energy, largest: f64::from(largest) * step }
+}
+
+/// The squared errors of coefficients, summed up for each lane.
+#[inline(always)]
+fn lost_energy(coefficients: &[Lane], codes: &[[i32; LANES]], step: f64) -> Lane {
+    let mut lanes = Lane::default();
+    for (coefficients, codes) in coefficients.iter().zip(codes) {
+        for l in 0..LANES {
+            let error = coefficients[l] - f64::from(codes[l]) * step;
+            lanes[l] += error * error;
+        }
     }
-    stats
+    lanes
+}
+
+#[inline(always)]
+fn energy(codes: &[i32], step: f64) -> f64 {
+    let (some, last) = codes.as_chunks::<LANES>();
+    let mut lanes = Lane::default();
+    for codes in some {
+        for l in 0..LANES {
+            let c = f64::from(codes[l]) * step;
+            lanes[l] += c * c;
+        }
+    }
+    let last = last.iter().map(|code| f64::from(*code) * step);
+    lanes.iter().sum::<f64>() + last.map(|c| c * c).sum::<f64>()
 }

@@ -6,7 +6,7 @@
 use super::WindowCodec;
 use super::box_samples::BoxSamples;
 use super::error_weights::QuantizerSetup;
-use super::truncate::Group;
+use super::group::Group;
 use crate::base::sample;
 use crate::wavelet::{LANES, Lane};
 
@@ -89,7 +89,8 @@ pub(super) fn load_group(
 ) {
     let voxels = missing.all / codec.frames();
     samples.load_lanes(first, count, &mut group.source);
-    if let (Some(weight), 0, LANES) = (weighing.common(), missing.count, count) {
+    group.common_weight = weighing.common().filter(|_| missing.count == 0 && count == LANES);
+    if let Some(weight) = group.common_weight {
         return group.weight.fill([weight; LANES]);
     }
     for (frame, (source, weight)) in group.source.iter().zip(&mut group.weight).enumerate() {

@@ -17,6 +17,7 @@ mod error_weights;
 pub mod field;
 mod forward;
 mod gain;
+mod group;
 mod listed;
 mod load;
 pub mod part;

@@ -9,13 +9,13 @@ use super::check::{Compared, Tally};
 use super::error_weights::QuantizerSetup;
 use super::field::Used;
 use super::forward::forward;
+use super::group::Group;
 use super::lane_groups;
 use super::load::{Source, load_group};
 use super::pyramid::Nodes;
 use super::real::Real;
 use super::rows::count_nonzero;
 use super::screen::{self, Screen};
-use super::truncate::Group;
 use crate::base::sample;
 use crate::base::vectors::dispatch;
 use crate::codec::bound::Measure;
@@ -27,7 +27,8 @@ pub(super) struct Coded {
     pub(super) step: f64,
     /// With a pyramid, whether each k may have nodes that are not zero.
     pub(super) marked: Vec<bool>,
-    /// With a pyramid, for each level part the number of its codes, and the change from leaving out it and all finer ones.
+    /// With a pyramid, for each level part the number of its codes, and the change from leaving out it and all finer ones. Also known if
+    /// there are no codes.
     pub(super) parts: Option<Vec<PartStats>>,
     pub(super) dropped: f64,
     pub(super) outliers: Outliers,
@@ -134,18 +135,29 @@ impl Source<'_> {
 
     /// The block with zeros in place of the nodes above and its own, if its samples are within the bound of that.
     fn zero<R: Real>(&self, weighing: &QuantizerSetup, field: &mut [R]) -> Option<Coded> {
-        let magnitude = self.missing.magnitude;
-        let is_small = self.codec.tier == 0 && magnitude <= self.codec.bound.allowed(magnitude);
-        if self.codec.tiers() == 0 || !is_small {
-            return None;
+        let by_sample = self.zero_by_sample();
+        if by_sample.is_some() || !self.is_small() {
+            return by_sample;
         }
-        let tally = match self.codec.bound.measure() {
-            Measure::Largest if !self.codec.is_missing(0.0) => Tally::of_zeros(self.codec, &self.samples, self.missing),
-            _ => {
-                field.fill(R::default());
-                self.compared(weighing, field, &vec![false; self.codec.basis.coefficients()])?
-            }
-        };
+        field.fill(R::default());
+        self.zeros(self.compared(weighing, field, &vec![false; self.codec.basis.coefficients()])?)
+    }
+
+    /// The block without codes, if the bound is one of single samples, and they are within it.
+    pub(super) fn zero_by_sample(&self) -> Option<Coded> {
+        let by_sample = self.codec.bound.measure() == Measure::Largest && !self.codec.is_missing(0.0);
+        let applies = by_sample && self.is_small();
+        applies.then(|| self.zeros(Tally::of_zeros(self.codec, &self.samples, self.missing))).flatten()
+    }
+
+    /// Whether the largest sample of a block of tier 0 is within the bound of zero.
+    fn is_small(&self) -> bool {
+        let magnitude = self.missing.magnitude;
+        self.codec.tier == 0 && magnitude <= self.codec.bound.allowed(magnitude)
+    }
+
+    /// The block without codes, if its tally has no outliers.
+    fn zeros(&self, tally: Tally) -> Option<Coded> {
         let parts = Some(vec![PartStats { count: 0, energy: 0.0, largest: 0.0 }; self.codec.parts()]);
         let (dropped, outliers) = (tally.squared_error, Outliers::default());
         let marked = Vec::new();

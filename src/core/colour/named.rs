@@ -31,9 +31,14 @@ impl Named {
 
     /// The colour at a share of the range, 0 to 1.
     pub(super) fn colour(&self, t: f64) -> Colour {
+        self.between(t, |a, b, t| ColourSpace::Rgb.between(*a, *b, t))
+    }
+
+    /// The mix of the colours around a share of the range, 0 to 1.
+    pub(super) fn between<M>(&self, t: f64, mix: impl Fn(&Colour, &Colour, f64) -> M) -> M {
         let index = t * (self.colours.len() - 1) as f64;
         let n = (index as usize).min(self.colours.len() - 2);
-        ColourSpace::Rgb.between(self.colours[n], self.colours[n + 1], index - n as f64)
+        mix(&self.colours[n], &self.colours[n + 1], index - n as f64)
     }
 }
 

@@ -44,10 +44,10 @@ impl ColourSpace {
     /// The colour at a share `t` of the way from `a` to `b`. All channels are 0 to 1.
     pub(super) fn between(self, a: Colour, b: Colour, t: f64) -> Colour {
         let colour = match self {
-            Self::Rgb => mix(a, b, t),
-            Self::Hsv => from_hsv(mix(hsv(a), hsv(b), t)),
+            Self::Rgb => mix_all(a, b, t),
+            Self::Hsv => from_hsv(mix_all(hsv(a), hsv(b), t)),
             Self::HsvWrapped => from_hsv(mix_wrapped(hsv(a), hsv(b), t)),
-            Self::Lab => lab::to_rgb(mix(lab::from_rgb(a), lab::from_rgb(b), t)),
+            Self::Lab => lab::to_rgb(mix_all(lab::from_rgb(a), lab::from_rgb(b), t)),
             Self::Diverging => diverging(polar(lab::from_rgb(a)), polar(lab::from_rgb(b)), t),
             Self::Step if t > 0.0 => b,
             Self::Step => a,
@@ -56,8 +56,13 @@ impl ColourSpace {
     }
 }
 
-fn mix(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t)
+fn mix_all(a: [f64; 3], b: [f64; 3], t: f64) -> [f64; 3] {
+    std::array::from_fn(|i| mix(a[i], b[i], t))
+}
+
+/// The number at a share `t` of the way from `a` to `b`.
+pub(super) fn mix(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
 }
 
 /// Converts to hue (0 to 1), saturation and value.
@@ -92,7 +97,7 @@ fn mix_wrapped(mut a: [f64; 3], mut b: [f64; 3], t: f64) -> [f64; 3] {
     } else if b[0] - a[0] > 0.5 {
         b[0] -= 1.0;
     }
-    mix(a, b, t)
+    mix_all(a, b, t)
 }
 
 /// Converts L*a*b* to Moreland's Msh: length, angle to the axis of greys, and hue. Angles are in radians.
@@ -121,7 +126,7 @@ fn diverging(mut a: [f64; 3], mut b: [f64; 3], mut t: f64) -> Colour {
     } else if b[1] < SATURATED && a[1] > SATURATED {
         b[2] = hue_of_grey(a, b[0]);
     }
-    let [length, angle, hue] = mix(a, b, t);
+    let [length, angle, hue] = mix_all(a, b, t);
     let chroma = length * libm::sin(angle);
     lab::to_rgb([length * libm::cos(angle), chroma * libm::cos(hue), chroma * libm::sin(hue)])
 }

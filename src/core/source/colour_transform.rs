@@ -69,8 +69,8 @@ impl ColourTransform {
     /// One channel of the colour of a value. A missing value has no colour, whatever the map gives NaN.
     fn component(&self, channel: usize, value: f64) -> [u8; 4] {
         let missing = sample::is_missing(value, self.missing_value);
-        let colour = if missing { None } else { self.colours.colour(value) };
-        colour.map_or(f32::NAN, |colour| colour[channel] as f32).to_le_bytes()
+        let component = if missing { None } else { self.colours.component(value, channel) };
+        component.map_or(f32::NAN, |component| component as f32).to_le_bytes()
     }
 }
 

@@ -32,17 +32,24 @@ use crate::base::vectors::dispatch;
 const Q: f64 = std::f64::consts::SQRT_2;
 
 /// A coarse interval's midpoint function, on its fine [mid, node, mid].
-const MID: [f64; 3] = [6.0 / (10.0 * Q), 8.0 * Q / (10.0 * Q), 6.0 / (10.0 * Q)];
-/// An interior coarse node's function, centred on it.
-const NODE: [f64; 7] = [-0.05, -3.0 * Q / 20.0, 0.45, 10.0 * Q / 20.0, 0.45, -3.0 * Q / 20.0, -0.05];
-/// An interior node's symmetric wavelet, centred on it.
-const EVEN: [f64; 7] = [-0.05, -3.0 * Q / 20.0, 0.45, -10.0 * Q / 20.0, 0.45, -3.0 * Q / 20.0, -0.05];
-/// An interior node's antisymmetric wavelet, centred on it.
-const ODD: [f64; 7] = [-1.0 / (10.0 * Q), -0.3, 9.0 / (10.0 * Q), 0.0, -9.0 / (10.0 * Q), 0.3, 1.0 / (10.0 * Q)];
-/// An end node's function, inward from it.
-const END_NODE: [f64; 4] = [10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 / (10.0 * Q)];
-/// An end node's wavelet, inward from it.
-const END_WAVELET: [f64; 4] = [-10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 / (10.0 * Q)];
+const MID: [[f64; 3]; 1] = [[6.0 / (10.0 * Q), 8.0 * Q / (10.0 * Q), 6.0 / (10.0 * Q)]];
+/// An interior coarse node's function, symmetric wavelet and antisymmetric wavelet, centred on it.
+const NODE: [[f64; 7]; 3] = [
+    [-0.05, -3.0 * Q / 20.0, 0.45, 10.0 * Q / 20.0, 0.45, -3.0 * Q / 20.0, -0.05],
+    [-0.05, -3.0 * Q / 20.0, 0.45, -10.0 * Q / 20.0, 0.45, -3.0 * Q / 20.0, -0.05],
+    [-1.0 / (10.0 * Q), -0.3, 9.0 / (10.0 * Q), 0.0, -9.0 / (10.0 * Q), 0.3, 1.0 / (10.0 * Q)],
+];
+/// The function and the wavelet of the first node, inward from it.
+const FIRST: [[f64; 4]; 2] = [
+    [10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 / (10.0 * Q)],
+    [-10.0 / (10.0 * Q), 9.0 / (10.0 * Q), -0.3, -1.0 / (10.0 * Q)],
+];
+/// The same of the last node, towards it.
+const LAST: [[f64; 4]; 2] = [reversed(FIRST[0]), reversed(FIRST[1])];
+
+const fn reversed(taps: [f64; 4]) -> [f64; 4] {
+    [taps[3], taps[2], taps[1], taps[0]]
+}
 
 /// The multiwavelet basis for one window.
 #[derive(Debug)]
@@ -88,17 +95,7 @@ fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
     prefilter(&mut fine);
     while intervals > 1 {
         let wavelets = &mut coefficients[intervals + 1..2 * intervals + 1];
-        for_each_filter(
-            intervals,
-            #[inline(always)]
-            |to, at, taps| {
-                let out = dot(taps, &fine[at..]);
-                match to {
-                    Target::Scaling(i) => coarse[i] = out,
-                    Target::Wavelet(i) => wavelets[i] = out,
-                }
-            },
-        );
+        filter(intervals, &mut Analysis { fine: &fine, coarse: &mut coarse, wavelets });
         std::mem::swap(&mut fine, &mut coarse);
         intervals /= 2;
     }
@@ -107,20 +104,14 @@ fn forward(mut intervals: usize, series: &[Lane], coefficients: &mut [Lane]) {
 
 #[inline(always)]
 fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
-    let mut coarse = coefficients.to_vec();
-    let mut fine = coarse.clone();
+    let mut fine = vec![Lane::default(); coefficients.len()];
+    let mut coarse = fine.clone();
+    coarse[..3].copy_from_slice(&coefficients[..3]);
     let mut intervals = 2;
     while intervals <= most {
         let wavelets = &coefficients[intervals + 1..2 * intervals + 1];
         fine[..2 * intervals + 1].fill(Lane::default());
-        for_each_filter(
-            intervals,
-            #[inline(always)]
-            |from, at, taps| match from {
-                Target::Scaling(i) => add_scaled(taps, &coarse[i], &mut fine[at..]),
-                Target::Wavelet(i) => add_scaled(taps, &wavelets[i], &mut fine[at..]),
-            },
-        );
+        filter(intervals, &mut Synthesis { fine: &mut fine, coarse: &coarse, wavelets });
         std::mem::swap(&mut fine, &mut coarse);
         intervals *= 2;
     }
@@ -128,48 +119,94 @@ fn inverse(most: usize, coefficients: &[Lane], series: &mut [Lane]) {
     series.copy_from_slice(&coarse[..series.len()]);
 }
 
-/// The output of a filter: a function of the next coarser level, or a wavelet.
+/// A function of the next coarser level, or a wavelet.
+#[derive(Clone, Copy)]
 enum Target {
     Scaling(usize),
     Wavelet(usize),
 }
 
-/// Calls `apply(target, first fine index, taps)` for every row of eq 19 on a level with `intervals` fine intervals.
+/// What rows of eq 19 that begin with the same fine function are applied to.
+trait Filter {
+    /// Applies rows with these taps, each for its target, at the first of their fine functions.
+    fn apply<const ROWS: usize, const TAPS: usize>(
+        &mut self,
+        to: [Target; ROWS],
+        first: usize,
+        rows: &[[f64; TAPS]; ROWS],
+    );
+}
+
+/// Applies every row of eq 19 on a level with `intervals` fine intervals.
 #[inline(always)]
-fn for_each_filter(intervals: usize, mut apply: impl FnMut(Target, usize, &[f64])) {
-    let reversed = |taps: [f64; 4]| [taps[3], taps[2], taps[1], taps[0]];
+fn filter(intervals: usize, of: &mut impl Filter) {
     let last = intervals / 2; // the last coarse node
-    let end = 2 * intervals - 3; // where its four fine functions start
-    apply(Target::Scaling(0), 0, &END_NODE);
-    apply(Target::Wavelet(0), 0, &END_WAVELET);
+    of.apply([Target::Scaling(0), Target::Wavelet(0)], 0, &FIRST);
     for c in 1..last {
-        apply(Target::Scaling(2 * c), 4 * c - 3, &NODE);
-        apply(Target::Wavelet(2 * c - 1), 4 * c - 3, &EVEN);
-        apply(Target::Wavelet(2 * c), 4 * c - 3, &ODD);
+        of.apply([Target::Scaling(2 * c), Target::Wavelet(2 * c - 1), Target::Wavelet(2 * c)], 4 * c - 3, &NODE);
     }
     for c in 0..last {
-        apply(Target::Scaling(2 * c + 1), 4 * c + 1, &MID);
+        of.apply([Target::Scaling(2 * c + 1)], 4 * c + 1, &MID);
     }
-    apply(Target::Scaling(2 * last), end, &reversed(END_NODE));
-    apply(Target::Wavelet(intervals - 1), end, &reversed(END_WAVELET));
+    of.apply([Target::Scaling(2 * last), Target::Wavelet(intervals - 1)], 2 * intervals - 3, &LAST);
 }
 
-#[inline(always)]
-fn dot(taps: &[f64], values: &[Lane]) -> Lane {
-    let mut out = Lane::default();
-    for (tap, value) in taps.iter().zip(values) {
-        for l in 0..LANES {
-            out[l] += tap * value[l];
+/// Computes a level's coarse functions and wavelets from its fine functions.
+struct Analysis<'a> {
+    fine: &'a [Lane],
+    coarse: &'a mut [Lane],
+    wavelets: &'a mut [Lane],
+}
+
+impl Filter for Analysis<'_> {
+    #[inline(always)]
+    fn apply<const ROWS: usize, const TAPS: usize>(
+        &mut self,
+        to: [Target; ROWS],
+        first: usize,
+        rows: &[[f64; TAPS]; ROWS],
+    ) {
+        let fine: &[Lane; TAPS] = self.fine[first..].first_chunk().expect("fine functions of every row");
+        for (to, taps) in to.into_iter().zip(rows) {
+            let mut sum = Lane::default();
+            for (tap, value) in taps.iter().zip(fine) {
+                for l in 0..LANES {
+                    sum[l] += tap * value[l];
+                }
+            }
+            match to {
+                Target::Scaling(i) => self.coarse[i] = sum,
+                Target::Wavelet(i) => self.wavelets[i] = sum,
+            }
         }
     }
-    out
 }
 
-#[inline(always)]
-fn add_scaled(taps: &[f64], coefficient: &Lane, values: &mut [Lane]) {
-    for (tap, value) in taps.iter().zip(values) {
-        for l in 0..LANES {
-            value[l] += tap * coefficient[l];
+/// Adds a level's coarse functions and wavelets to its fine functions.
+struct Synthesis<'a> {
+    fine: &'a mut [Lane],
+    coarse: &'a [Lane],
+    wavelets: &'a [Lane],
+}
+
+impl Filter for Synthesis<'_> {
+    #[inline(always)]
+    fn apply<const ROWS: usize, const TAPS: usize>(
+        &mut self,
+        from: [Target; ROWS],
+        first: usize,
+        rows: &[[f64; TAPS]; ROWS],
+    ) {
+        let from = from.map(|from| match from {
+            Target::Scaling(i) => self.coarse[i],
+            Target::Wavelet(i) => self.wavelets[i],
+        });
+        for (n, value) in self.fine[first..][..TAPS].iter_mut().enumerate() {
+            for (taps, from) in rows.iter().zip(&from) {
+                for l in 0..LANES {
+                    value[l] += taps[n] * from[l];
+                }
+            }
         }
     }
 }
