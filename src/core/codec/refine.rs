@@ -113,7 +113,7 @@ impl Source<'_> {
         while checked.has_many_outliers(self.missing.all, codes) && step > finest {
             let (finer, cost) = ((step / FINER).max(finest), checked.cost(codes));
             let found = encode(finer, field, codes).map(|()| check(field, codes));
-            let is_worse = |found: &Checked| found.tally.is_some() && cost <= found.cost(codes);
+            let is_worse = |found: &Checked| found.tally.is_some() && found.cost(codes) > cost;
             match found {
                 Some(found) if !is_worse(&found) => (step, checked) = (finer, found),
                 _ => {
@@ -340,7 +340,7 @@ const MOST_OUTLIERS: usize = 8;
 
 /// Finer steps are tried if more than one sample in this many misses the bound. Fewer cost few bytes, and each try takes as long
 /// as coding the block.
-const FEW_OUTLIERS: usize = 512;
+const FEW_OUTLIERS: usize = 1 << 14;
 
 /// A finer step is tried if fewer codes than this come with an outlier. An outlier takes as many bytes as about eight.
 const CODES_PER_OUTLIER: usize = 8;

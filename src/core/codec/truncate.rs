@@ -302,9 +302,9 @@ impl Errors {
                     errors[l] = ((decoded[l] - source[l]) * weight[l]) as f32;
                 }
             }
-            for l in 0..LANES {
-                for t in 0..CHUNK {
-                    self.of_lanes[l * chunks + n][t] = errors[t][l];
+            for (t, errors) in errors.iter().enumerate() {
+                for (l, error) in errors.iter().enumerate() {
+                    self.of_lanes[l * chunks + n][t] = *error;
                 }
             }
         }

@@ -12,7 +12,7 @@
 
 use super::learn::learned_functions;
 use super::smoothness::{AXES, roughest_first};
-use super::trial_boxes::{BoxSize, Sampled, TrialBoxes};
+use super::trial_boxes::{BoxSize, Boxes, Sampled, TrialBoxes};
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -58,14 +58,21 @@ struct Transformed<'a, R: Real> {
     codec: Mutex<WindowCodec>,
     basis: Basis,
     boxes: Vec<Trial<'a, R>>,
+    /// The voxels that the boxes stand for.
+    voxels: f64,
 }
 
 impl<'a, R: Real + Send + Sync> Transformed<'a, R> {
     /// Some boxes under the transform of a codec.
-    fn new(codec: WindowCodec, boxes: &'a [Sampled]) -> Self {
+    fn new(codec: WindowCodec, of: &'a Boxes) -> Self {
         let trial = |b: &'a Sampled| Trial::new(&codec, b.size, b.outer, &b.samples);
-        let boxes = boxes.par_iter().map(trial).collect();
-        Self { basis: codec.scheme.basis, boxes, codec: Mutex::new(codec) }
+        let boxes = of.sampled.par_iter().map(trial).collect();
+        Self { basis: codec.scheme.basis, boxes, voxels: of.voxels, codec: Mutex::new(codec) }
+    }
+
+    /// The voxels of all boxes.
+    fn sampled(&self) -> f64 {
+        self.boxes.iter().map(Trial::voxels).sum::<usize>() as f64
     }
 }
 
@@ -175,9 +182,10 @@ impl SchemeSelector<'_> {
     fn is_listed<R: Real + Send + Sync>(&self, tried: &Tried, trials: &[Transformed<'_, R>]) -> bool {
         let Some(of_basis) = of_basis(&tried.scheme, trials).filter(|_| self.lists) else { return false };
         let codec = self.with_scheme(&tried.scheme, of_basis);
-        let boxes = || of_basis.boxes.iter().zip(&tried.of_boxes);
-        let listed = boxes().filter(|(of_box, bytes)| of_box.listed_bytes(&codec, **bytes).is_some());
-        2 * listed.map(|(of_box, _)| of_box.voxels()).sum::<usize>() > boxes().map(|(of_box, _)| of_box.voxels()).sum()
+        let boxes = of_basis.boxes.iter().zip(&tried.of_boxes);
+        let listed = boxes.filter(|(of_box, bytes)| of_box.listed_bytes(&codec, **bytes).is_some());
+        let share = listed.map(|(of_box, _)| of_box.voxels()).sum::<usize>() as f64 / of_basis.sampled();
+        2.0 * share * of_basis.voxels > self.boxes().voxels() as f64
     }
 
     /// The codec of the chosen scheme.
@@ -198,11 +206,7 @@ impl SchemeSelector<'_> {
     }
 
     /// The boxes under each of the schemes' transforms along time.
-    fn transformed<'a, R: Real + Send + Sync>(
-        &self,
-        schemes: &[Scheme],
-        boxes: &'a [Sampled],
-    ) -> Vec<Transformed<'a, R>> {
+    fn transformed<'a, R: Real + Send + Sync>(&self, schemes: &[Scheme], boxes: &'a Boxes) -> Vec<Transformed<'a, R>> {
         let mut found: Vec<Transformed<'a, R>> = Vec::new();
         for scheme in schemes {
             if found.iter().all(|f| f.basis != scheme.basis) {
@@ -240,16 +244,23 @@ impl SchemeSelector<'_> {
         };
         let codec = &*self.with_scheme(&scheme, of_basis);
         let of_boxes: Vec<usize> = of_basis.boxes.par_iter().map(|b| b.bytes(codec, pyramid)).collect();
-        let voxels = of_basis.boxes.iter().map(Trial::voxels).sum::<usize>() as f64;
-        let bytes =
-            of_boxes.iter().sum::<usize>() as f64 * self.boxes().voxels() as f64 / voxels + bytes_of_functions(&scheme);
+        let of_sampled = of_boxes.iter().sum::<usize>() as f64;
+        let bytes = of_sampled * of_basis.voxels / of_basis.sampled() + bytes_of_functions(&scheme);
         Tried { scheme, bytes, of_boxes }
     }
 
     /// Where boxes are taken from.
     fn boxes(&self) -> TrialBoxes<'_> {
         let pyramid = self.pyramid(&AXES, Stencil::Cubic);
-        TrialBoxes { archive: self.archive, channels: self.channels, most: self.most, is_rough: self.is_rough, pyramid }
+        TrialBoxes {
+            archive: self.archive,
+            channels: self.channels,
+            missing_value: self.config.missing_value,
+            bound: self.promise,
+            most: self.most,
+            is_rough: self.is_rough,
+            pyramid,
+        }
     }
 
     /// The number of frames in the window.
@@ -258,7 +269,7 @@ impl SchemeSelector<'_> {
     }
 
     /// The axes from the roughest to the smoothest.
-    fn order<'b>(&self, boxes: &'b [Sampled]) -> [Axis; 4] {
+    fn order<'b>(&self, boxes: &'b Boxes) -> [Axis; 4] {
         let (ty, missing) = (self.archive.sample, self.config.missing_value);
         let values = |b: &'b Sampled| {
             let samples = &b.samples;
@@ -270,7 +281,7 @@ impl SchemeSelector<'_> {
             let [x, y, z] = b.size.known;
             (value, [x, y, z, self.frames()])
         };
-        roughest_first(boxes.iter().map(values), self.promise.delta)
+        roughest_first(boxes.sampled.iter().map(values), self.promise.delta)
     }
 
     /// One scheme with a pyramid for each allowed transform along time.
@@ -322,9 +333,10 @@ impl SchemeSelector<'_> {
     fn functions(&self) -> Result<Vec<i16>> {
         let size = [self.archive.grid.dims[0], 1, 1];
         let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
-        let rows: Result<Vec<Sampled>> = (0..rows).map(|i| self.boxes().sampled(LEARNING + i, size)).collect();
+        let boxes = self.boxes();
+        let numbers = boxes.active(LEARNING, rows, size)?.numbers;
+        let samples = numbers.into_iter().map(|number| boxes.sampled(number, size)).collect::<Result<Vec<_>>>()?;
         let (ty, frames) = (self.archive.sample, self.frames());
-        let samples = rows?;
         let samples = samples.iter().map(|row| &row.samples[..]);
         Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))
     }

@@ -3,8 +3,9 @@
 use super::spread::evenly;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
-use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::base::sample::{self, SampleType};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
+use wavesplat_core::codec::bound::ErrorBound;
 use wavesplat_core::codec::scheme::Pyramid;
 use wavesplat_core::source::{Archive, FrameWindow, read_frames};
 
@@ -25,6 +26,20 @@ pub(super) struct Sampled {
     /// The voxels that pyramids may use.
     pub(super) outer: [usize; 3],
     pub(super) samples: Vec<u8>,
+}
+
+/// Boxes, and how much they stand for.
+pub(super) struct Boxes {
+    pub(super) sampled: Vec<Sampled>,
+    /// The voxels of the channels, less those like boxes that were passed over.
+    pub(super) voxels: f64,
+}
+
+/// The boxes in which samples change.
+pub(super) struct Active {
+    pub(super) numbers: Vec<usize>,
+    /// The share of all places where samples change; 1 if none was found.
+    share: f64,
 }
 
 /// How large boxes are.
@@ -49,6 +64,10 @@ pub(super) struct TrialBoxes<'a> {
     pub(super) archive: &'a Archive,
     /// The window's samples, channel by channel.
     pub(super) channels: &'a [&'a dyn FrameWindow],
+    /// The value of a missing sample.
+    pub(super) missing_value: Option<f64>,
+    /// The promised bound.
+    pub(super) bound: ErrorBound,
     /// The most samples of all boxes.
     pub(super) most: usize,
     /// Whether the scheme need not be the best: then no large boxes follow small ones.
@@ -59,12 +78,47 @@ pub(super) struct TrialBoxes<'a> {
 
 impl TrialBoxes<'_> {
     /// Boxes spread over the volume and the channels: about one voxel in fifty, but at least a few boxes of a size that
-    /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny.
-    pub(super) fn read(&self, size: BoxSize) -> Result<Vec<Sampled>> {
+    /// represents blocks. Of small volumes they are at most an eighth, unless they would be tiny. Boxes that every scheme codes by next
+    /// to nothing are passed over, as far as others are found.
+    pub(super) fn read(&self, size: BoxSize) -> Result<Boxes> {
         let (voxels, most) = (self.voxels_of(size), self.most_voxels(size));
         let volume = voxels.iter().product::<usize>();
         let count = (self.voxels() / SHARE / volume).clamp(self.least(), MOST_BOXES).min(most / volume).max(1);
-        (0..count).map(|i| self.sampled(i, voxels)).collect()
+        let Active { numbers, share } = self.active(0, count, voxels)?;
+        let sampled = numbers.into_iter().map(|number| self.sampled(number, voxels)).collect::<Result<_>>()?;
+        Ok(Boxes { sampled, voxels: self.voxels() as f64 * share })
+    }
+
+    /// The numbers, from `first` on, of `count` boxes of a size in which samples change, or others if too few are found.
+    pub(super) fn active(&self, first: usize, count: usize, size: [usize; 3]) -> Result<Active> {
+        let (mut numbers, mut quiet) = (Vec::new(), Vec::new());
+        for number in (first..).take(count * CANDIDATES) {
+            let to = if self.is_quiet(number, size)? { &mut quiet } else { &mut numbers };
+            to.push(number);
+            if numbers.len() == count {
+                break;
+            }
+        }
+        let all = numbers.len() + quiet.len();
+        let share = if numbers.is_empty() { 1.0 } else { numbers.len() as f64 / all as f64 };
+        quiet.truncate(count - numbers.len());
+        numbers.append(&mut quiet);
+        Ok(Active { numbers, share })
+    }
+
+    /// Whether one value is within the bound of all samples of a box, as far as a few frames show.
+    fn is_quiet(&self, number: usize, size: [usize; 3]) -> Result<bool> {
+        let (window, region) = (self.window(number), self.place(number, size).region);
+        let frames = [0, window.frames() / 2, window.frames() - 1];
+        let (mut samples, mut range) = (vec![0; region.voxels() * self.archive.sample.size()], NOTHING);
+        for frame in frames {
+            window.read_box(frame, &region, &mut samples)?;
+            let of_frame = sample::range_of_present(self.archive.sample, &samples, self.missing_value, |_| {});
+            range = sample::join_ranges(range, of_frame);
+        }
+        let (lo, hi) = range;
+        let nearest_zero = if lo <= 0.0 && hi >= 0.0 { 0.0 } else { lo.abs().min(hi.abs()) };
+        Ok(lo > hi || hi - lo <= 2.0 * self.bound.allowed(nearest_zero))
     }
 
     /// Voxels of a box along x, y, z.
@@ -97,9 +151,21 @@ impl TrialBoxes<'_> {
         (self.voxels() / LARGEST_SHARE).min(most / self.frames())
     }
 
-    /// Reads the box with this number. Its position is one of an evenly spread sequence, the same for every window;
-    /// channels take turns.
+    /// Reads the box with this number.
     pub(super) fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
+        let BoxPlace { region, outer, size } = self.place(number, size);
+        let window = self.window(number);
+        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
+        Ok(Sampled { size, outer, samples })
+    }
+
+    /// The channel of a box: channels take turns.
+    fn window(&self, number: usize) -> &dyn FrameWindow {
+        self.channels[number % self.channels.len()]
+    }
+
+    /// The place of a box: one of an evenly spread sequence, the same for every window.
+    fn place(&self, number: usize, size: [usize; 3]) -> BoxPlace {
         let dims = self.archive.grid.dims;
         // Blocks at far faces are followed by no other voxels. They are taken for every second box.
         let ghosts = self.pyramid.ghost_nodes(size);
@@ -108,12 +174,20 @@ impl TrialBoxes<'_> {
         let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
         let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
-        let size = BlockWithGhosts { size, known };
-        let window = self.channels[number % self.channels.len()];
-        let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
-        Ok(Sampled { size, outer, samples })
+        BoxPlace { region, outer, size: BlockWithGhosts { size, known } }
     }
 }
+
+/// Where a box is.
+struct BoxPlace {
+    region: Region,
+    /// The voxels that pyramids may use.
+    outer: [usize; 3],
+    size: BlockWithGhosts,
+}
+
+/// The range of no samples.
+const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
 /// The number of samples that may always be read.
 const FEW_SAMPLES: usize = 1 << 17;
@@ -124,6 +198,9 @@ const SHARE: usize = 50;
 /// The smallest and the largest number of boxes for trials.
 const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
+
+/// So many places are looked at for each box, until one is found where samples change.
+const CANDIDATES: usize = 16;
 
 /// At most one voxel in this many is used for trials.
 const LARGEST_SHARE: usize = 8;
