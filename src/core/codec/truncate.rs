@@ -331,3 +331,109 @@ impl Errors {
 
 /// A coefficient's share of the bound that rounding in 32-bit floats may take: errors and changes are below two bounds.
 const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::sample::SampleType;
+    use crate::codec::bound::{Bound, ErrorBound};
+    use crate::codec::scheme::Scheme;
+    use crate::wavelet::Basis;
+
+    /// A number from -1 to 1.
+    fn number(i: usize) -> f64 {
+        f64::from((i as u32 + 1).wrapping_mul(0x9E37_79B1) >> 8) / f64::from(1 << 23) - 1.0
+    }
+
+    /// The weighted error of codes: the largest of a series, or the root mean square.
+    fn error(codec: &WindowCodec, group: &Group, codes: &[i32], step: f64, lane: usize) -> f64 {
+        let decoded =
+            |t: usize| codes.iter().zip(&*codec.synthesis).map(|(code, u)| f64::from(*code) * step * u[t]).sum();
+        let frames = group.source.iter().zip(&group.weight).enumerate();
+        let errors = frames.map(|(t, (source, weight))| {
+            let decoded: f64 = decoded(t);
+            (decoded - source[lane]).abs() * weight[lane]
+        });
+        match codec.bound.measure() {
+            Measure::Largest => errors.fold(0.0, f64::max),
+            Measure::RootMeanSquare => (errors.map(|e| e * e).sum::<f64>() / group.present(lane)).sqrt(),
+        }
+    }
+
+    /// The codes of a lane without as many of the smallest as the bound allows; none if rounding in 32-bit floats may decide.
+    fn kept(codec: &WindowCodec, group: &Group, step: f64, lane: usize) -> Option<Vec<i32>> {
+        let mut codes: Vec<i32> =
+            group.coefficients.iter().map(|c| (c[lane] / step).round_ties_even() as i32).collect();
+        if error(codec, group, &vec![0; codes.len()], step, lane) <= 1.0 {
+            return Some(vec![0; codes.len()]);
+        }
+        let mut order: Vec<usize> = (0..codes.len()).filter(|k| codes[*k] != 0).collect();
+        order.sort_by(|a, b| group.coefficients[*a][lane].abs().total_cmp(&group.coefficients[*b][lane].abs()));
+        for k in order {
+            let code = std::mem::take(&mut codes[k]);
+            let error = error(codec, group, &codes, step, lane);
+            if (error - 1.0).abs() < 1e-3 {
+                return None;
+            }
+            if error > 1.0 {
+                codes[k] = code;
+                break;
+            }
+        }
+        Some(codes)
+    }
+
+    #[test]
+    fn the_smallest_coefficients_are_dropped_as_long_as_the_bound_holds() {
+        let (mut compared, mut dropped) = (0, 0);
+        for (basis, frames) in [(Basis::Haar, 32), (Basis::Haar, 13), (Basis::Multi, 33), (Basis::Multi, 5)] {
+            for (bound, case) in
+                [(Bound::Pointwise, 0), (Bound::Rms, 0), (Bound::Relative { floor: 0.1 }, 1), (Bound::Rms, 1)]
+            {
+                let bound = ErrorBound { bound, tolerance: 0.1, delta: 0.1 };
+                let codec = WindowCodec::new(Scheme::along_time(basis), frames, SampleType::F64, bound, 8);
+                let step = bound.step(0.1, codec.gain);
+                let (mut group, mut truncation) = (Group::new(&codec), Truncation::new(&codec, step));
+                for seed in 0..20 {
+                    for (t, (source, weight)) in group.source.iter_mut().zip(&mut group.weight).enumerate() {
+                        let value = |l: usize| {
+                            let wave = (t as f64 / 7.0 + l as f64).sin() + 0.3 * number(seed * 999 + t * LANES + l);
+                            wave * [1.0, 0.2, 0.05][l % 3]
+                        };
+                        *source = std::array::from_fn(value);
+                        let varies = |l: usize| [10.0, 10.0 * (1.0 + number(t + l).abs()), 0.0][(t + l + seed) % 3];
+                        *weight = if case == 0 { [10.0; LANES] } else { std::array::from_fn(varies) };
+                    }
+                    group.common_weight = (case == 0).then_some(10.0);
+                    assert!(truncation.code(&mut group));
+                    for lane in 0..LANES {
+                        let Some(expected) = kept(&codec, &group, step, lane) else { continue };
+                        let found: Vec<i32> = group.codes.iter().map(|codes| codes[lane]).collect();
+                        assert_eq!(found, expected, "{basis:?} {:?}, lane {lane}", bound.bound);
+                        compared += 1;
+                        let nonzero = group.coefficients.iter().filter(|c| (c[lane] / step).round_ties_even() != 0.0);
+                        dropped += nonzero.count() - found.iter().filter(|code| **code != 0).count();
+                    }
+                }
+            }
+        }
+        assert!(compared > 1800 && dropped > compared, "{compared} {dropped}");
+    }
+
+    #[test]
+    fn networks_sort_any_number_of_rows() {
+        for len in 1..70_usize {
+            let mut rows: Vec<[u32; LANES]> = (0..len)
+                .map(|i| std::array::from_fn(|l| ((i + 7 * l) as u32).wrapping_mul(0x9E37_79B1) >> 27))
+                .collect();
+            let mut expected = rows.clone();
+            for lane in 0..LANES {
+                let mut sorted: Vec<u32> = rows.iter().map(|row| row[lane]).collect();
+                sorted.sort_unstable();
+                expected.iter_mut().zip(sorted).for_each(|(row, key)| row[lane] = key);
+            }
+            sort_lanes(&mut rows, &sorting_network(len.next_power_of_two().ilog2()));
+            assert_eq!(rows, expected);
+        }
+    }
+}
