@@ -9,6 +9,7 @@ use crate::limits::MAX_LISTED;
 use crate::planes::{pack_planes, unpack_planes};
 use crate::pyramid::Packing;
 use std::collections::HashMap;
+use std::ops::Range;
 
 /// Which sample predicts another's place in the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,33 +84,41 @@ impl Listed {
         counts.iter().position(|count| *count == most).unwrap_or(0) as u16
     }
 
-    /// How far each sample's place is from the predicted one.
-    fn codes(&self, predictor: Predictor, base: u16, codes: &mut Vec<i32>) {
-        let (base, places) = (i32::from(base), || self.places.iter().map(|place| i32::from(*place)));
+    /// How far each sample's place is from the predicted one, in some frames.
+    fn codes(&self, predictor: Predictor, base: u16, frames: Range<usize>, codes: &mut Vec<i32>) {
+        let voxels: usize = self.extents[..3].iter().product();
+        let of_frames = frames.start * voxels..frames.end * voxels;
+        let (base, places) =
+            (i32::from(base), |at: Range<usize>| self.places[at].iter().map(|place| i32::from(*place)));
         codes.clear();
         match predictor {
-            Predictor::Base => codes.extend(places().map(|place| place - base)),
+            Predictor::Base => codes.extend(places(of_frames).map(|place| place - base)),
             Predictor::X => {
-                let expected =
-                    |at: usize| if at.is_multiple_of(self.extents[0]) { base } else { self.places[at - 1].into() };
-                codes.extend(places().enumerate().map(|(at, place)| place - expected(at)));
+                for row in self.places[of_frames].chunks(self.extents[0]) {
+                    codes.push(i32::from(row[0]) - base);
+                    codes.extend(row.windows(2).map(|pair| i32::from(pair[1]) - i32::from(pair[0])));
+                }
             }
             Predictor::T => {
-                let voxels = self.extents[..3].iter().product();
-                let expected = std::iter::repeat_n(base, voxels).chain(places());
-                codes.extend(places().zip(expected).map(|(place, expected)| place - expected));
+                let first = of_frames.start.max(voxels);
+                codes.extend(places(of_frames.start..first).map(|place| place - base)); // the first frame of all
+                let before = places(first - voxels..of_frames.end - voxels);
+                codes.extend(places(first..of_frames.end).zip(before).map(|(place, before)| place - before));
             }
         }
     }
 
-    /// The predictor that makes the codes smallest, and about how many bytes they take.
+    /// The predictor that makes the codes of some frames smallest, and about how many bytes those of all take.
     fn best(&self, base: u16, codes: &mut Vec<i32>) -> (usize, Predictor) {
+        let all = self.extents[3];
+        let some = all.div_ceil(FRAMES_OF_ONE).max(FEW_FRAMES).min(all);
+        let first = (all - some) / 2;
         let estimated = |predictor| {
-            self.codes(predictor, base, codes);
-            (Packing::Nested.estimate(&self.boxes(codes)), predictor)
+            self.codes(predictor, base, first..first + some, codes);
+            (Packing::Nested.estimate(&self.boxes(codes)) * all / some, predictor)
         };
-        let all = Predictor::ALL.map(estimated);
-        all.into_iter().min_by_key(|of| of.0).unwrap_or((0, Predictor::Base))
+        let estimates = Predictor::ALL.map(estimated);
+        estimates.into_iter().min_by_key(|of| of.0).unwrap_or((0, Predictor::Base))
     }
 
     /// About how many bytes the payload takes. `codes` is scratch.
@@ -117,11 +126,11 @@ impl Listed {
         FIELDS + self.values.len() + self.best(self.base(), codes).0
     }
 
-    /// Appends the payload with the predictor that makes it smallest. `codes` is scratch.
+    /// Appends the payload with the predictor that makes some frames smallest. `codes` is scratch.
     pub fn pack(&self, codes: &mut Vec<i32>, out: &mut Vec<u8>) {
         let base = self.base();
         let (_, predictor) = self.best(base, codes);
-        self.codes(predictor, base, codes);
+        self.codes(predictor, base, 0..self.extents[3], codes);
         out.put_u32((self.values.len() / self.size) as u32);
         out.put_u16(base);
         out.put_u16(predictor as u16);
@@ -129,8 +138,10 @@ impl Listed {
         Packing::Nested.pack(&self.boxes(codes), out);
     }
 
+    /// The box of the codes of some frames.
     fn boxes<'a>(&self, codes: &'a [i32]) -> Vec<DenseCodes<'a>> {
-        DenseCodes::one_after_another(codes, &[CodeBox::contiguous(self.extents)])
+        let [x, y, z, _] = self.extents;
+        DenseCodes::one_after_another(codes, &[CodeBox::contiguous([x, y, z, codes.len() / (x * y * z)])])
     }
 }
 
@@ -222,6 +233,10 @@ pub(crate) fn max_listed(size: usize, extents: [usize; 4]) -> usize {
 /// Bytes of the fields before the values.
 const FIELDS: usize = 8;
 
+/// Predictors are compared in one of so many frames, but in a few at least.
+const FRAMES_OF_ONE: usize = 8;
+const FEW_FRAMES: usize = 2;
+
 /// Slots for values that were found lately, because a hash map is slow; and a factor that spreads values over them.
 const RECENT: usize = 1 << 10;
 const SPREADS: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -297,7 +312,7 @@ mod tests {
             prop_assert_eq!(&unpack_listed(&raw, size, extents).expect("packed"), &samples);
             let mut codes = Vec::new();
             for predictor in Predictor::ALL {
-                listed.codes(predictor, listed.base(), &mut codes);
+                listed.codes(predictor, listed.base(), 0..extents[3], &mut codes);
                 let sparse = {
                     let (mut raw, mut sparse) = (Vec::new(), SparseCodes::default());
                     Packing::Nested.pack(&listed.boxes(&codes), &mut raw);

@@ -203,4 +203,4 @@ const MOST_BOXES: usize = 12;
 const CANDIDATES: usize = 16;
 
 /// At most one voxel in this many is used for trials.
-const LARGEST_SHARE: usize = 8;
+const LARGEST_SHARE: usize = 16;
