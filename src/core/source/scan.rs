@@ -100,19 +100,21 @@ pub fn scan_frame(
     let [nx, ny, nz] = grid.dims;
     let rows = (RUN_BYTES / (nx * ty.size())).clamp(1, ny);
     let runs_in_plane = ny.div_ceil(rows);
-    let runs: Result<Vec<Scan>> = (0..nz * runs_in_plane)
-        .into_par_iter()
-        .map(|index| {
-            let (z, y) = (index / runs_in_plane, index % runs_in_plane * rows);
-            let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
-            let mut bytes = BYTES.take();
-            bytes.resize(run.voxels() * ty.size(), 0);
-            window.read_box(frame, &run, &mut bytes)?;
-            let found = scan_run(&bytes, ty, declared, &seen.extremes, frame, (z * ny + y) * nx);
-            BYTES.set(bytes);
-            Ok(found)
-        })
-        .collect();
+    let scanned = |index| {
+        let (z, y) = (index / runs_in_plane, index % runs_in_plane * rows);
+        let run = Region { start: [0, y, z], end: [nx, (y + rows).min(ny), z + 1] };
+        let mut bytes = BYTES.take();
+        bytes.resize(run.voxels() * ty.size(), 0);
+        window.read_box(frame, &run, &mut bytes)?;
+        let found = scan_run(&bytes, ty, declared, &seen.extremes, frame, (z * ny + y) * nx);
+        BYTES.set(bytes);
+        Ok(found)
+    };
+    let all = 0..nz * runs_in_plane;
+    let runs: Result<Vec<Scan>> = match nx * ny * nz * ty.size() {
+        ..=RUN_BYTES => all.map(scanned).collect(), // waking a thread takes longer
+        _ => all.into_par_iter().map(scanned).collect(),
+    };
     Ok(runs?.into_iter().fold(seen, Scan::then))
 }
 

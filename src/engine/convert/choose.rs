@@ -289,7 +289,8 @@ impl SchemeSelector<'_> {
         let SchemeConstraint { basis, space } = self.config.coding;
         let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
-            None => (self.frames() > 1).then_some(Basis::Learned), // the others are never the smallest
+            // Other transforms are never the smallest, and for a few series functions take too much.
+            None => (self.frames() > 1 && self.boxes().voxels() >= LEAST_SERIES).then_some(Basis::Learned),
             Some(Basis::Samples) => None,
             forced => forced,
         };
@@ -459,6 +460,9 @@ fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme>
 /// The number of rows that functions are learned from, and the number of the first position.
 const ROWS: usize = 64;
 const LEARNING: usize = 1000;
+
+/// Functions are learned for this many voxels and more.
+const LEAST_SERIES: usize = 16;
 
 /// A scheme is tuned only if its estimate is at most this many times the smallest.
 const PROMISING: f64 = 1.3;
