@@ -124,8 +124,17 @@ impl TrialBoxes<'_> {
     /// Voxels of a box along x, y, z.
     pub(super) fn voxels_of(&self, size: BoxSize) -> [usize; 3] {
         let (most, least) = (self.most_voxels(size), self.least());
-        let mut boxes = size.edges().iter().map(|edge| self.archive.grid.dims.map(|n| n.min(*edge)));
-        boxes.find(|voxels| least * voxels.iter().product::<usize>() <= most).unwrap_or([1; 3])
+        let fits = |edge: &&usize| {
+            let is_large = **edge > SMALL_EDGE && size == BoxSize::Small && !self.is_rough; // estimates need larger boxes
+            let most = if is_large { most.min(self.voxels() / LARGEST_SHARE_OF_LARGE) } else { most };
+            least * self.voxels_of_edge(**edge).iter().product::<usize>() <= most
+        };
+        size.edges().iter().find(fits).map_or([1; 3], |edge| self.voxels_of_edge(*edge))
+    }
+
+    /// Voxels of a box with so many a side along x, y, z.
+    fn voxels_of_edge(&self, edge: usize) -> [usize; 3] {
+        self.archive.grid.dims.map(|n| n.min(edge))
     }
 
     /// Voxels of all channels.
@@ -203,4 +212,8 @@ const MOST_BOXES: usize = 12;
 const CANDIDATES: usize = 16;
 
 /// At most one voxel in this many is used for trials.
-const LARGEST_SHARE: usize = 16;
+const LARGEST_SHARE: usize = 8;
+
+/// Larger boxes are taken only if they are at most one voxel in so many.
+const SMALL_EDGE: usize = 16;
+const LARGEST_SHARE_OF_LARGE: usize = 16;
