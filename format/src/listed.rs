@@ -112,7 +112,7 @@ impl Listed {
     fn best(&self, base: u16, codes: &mut Vec<i32>) -> (usize, Predictor) {
         let all = self.extents[3];
         let some = all.div_ceil(FRAMES_OF_ONE).max(FEW_FRAMES).min(all);
-        let first = (all - some) / 2;
+        let first = (all - some).div_ceil(2);
         let estimated = |predictor| {
             self.codes(predictor, base, first..first + some, codes);
             (Packing::Nested.estimate(&self.boxes(codes)) * all / some, predictor)

@@ -337,6 +337,7 @@ fn lost_energy(coefficients: &[Lane], codes: &[[i32; LANES]], step: f64) -> Lane
     lanes
 }
 
+/// The sum of squared coefficients.
 #[inline(always)]
 fn energy(codes: &[i32], step: f64) -> f64 {
     let (some, last) = codes.as_chunks::<LANES>();

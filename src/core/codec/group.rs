@@ -12,7 +12,7 @@ pub(super) struct Group {
     pub(super) source: Vec<Lane>,
     /// The weight of each sample's error, 0 if the sample is missing; `frames` lanes.
     pub(super) weight: Vec<Lane>,
-    /// The weight that all samples share; none if their weights differ.
+    /// The weight that all samples share; none if their weights differ, samples are missing or lanes are unused.
     pub(super) common_weight: Option<f64>,
     /// The coefficients before quantisation; K lanes.
     pub(super) coefficients: Vec<Lane>,

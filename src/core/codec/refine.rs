@@ -27,8 +27,8 @@ pub(super) struct Coded {
     pub(super) step: f64,
     /// With a pyramid, whether each k may have nodes that are not zero.
     pub(super) marked: Vec<bool>,
-    /// With a pyramid, for each level part the number of its codes, and the change from leaving out it and all finer ones. Also known if
-    /// there are no codes.
+    /// With a pyramid, or if there are no codes: for each level part the number of its codes, and the change from leaving out it and all
+    /// finer ones.
     pub(super) parts: Option<Vec<PartStats>>,
     pub(super) dropped: f64,
     pub(super) outliers: Outliers,
@@ -390,7 +390,7 @@ mod tests {
             for basis in [Basis::Learned, Basis::Samples] {
                 let functions = if basis == Basis::Learned { vec![20000; frames] } else { Vec::new() };
                 let mut codec =
-                    WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 8);
+                    WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 512);
                 codec.missing_value = declared;
                 let samples = BoxSamples::new(ty, &bytes, of, size);
                 let around = Missing::find(&codec, &bytes);

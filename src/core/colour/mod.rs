@@ -167,7 +167,8 @@ impl TransferFunction {
         ((value - self.range.0) / (self.range.1 - self.range.0)).clamp(0.0, 1.0)
     }
 
-    /// One channel of [`Self::colour`], with the same bits: 0 for red, 1 for green, 2 for blue. Faster, since maps are often linear.
+    /// One channel of [`Self::colour`], with the same bits: 0 for red, 1 for green, 2 for blue. Faster than all three where colours are
+    /// mixed in RGB.
     pub fn component(&self, value: f64, channel: usize) -> Option<f64> {
         if value.is_nan() {
             return self.nan.map(|colour| colour[channel]);
@@ -326,7 +327,7 @@ impl<'a, T> Place<'a, T> {
     /// The place of a value. If two points have the same value, the second one holds from there on.
     fn new(points: &'a [(f64, T)], value: f64) -> Self {
         let next = match points.len() {
-            ..=FEW_POINTS => points.iter().map(|(v, _)| usize::from(*v <= value)).sum(), // without conditions
+            ..=FEW_POINTS => points.iter().map(|(v, _)| usize::from(*v <= value)).sum(), // without branches
             _ => points.partition_point(|(v, _)| *v <= value),
         };
         match (next.checked_sub(1).map(|last| &points[last]), points.get(next)) {
@@ -337,7 +338,7 @@ impl<'a, T> Place<'a, T> {
     }
 }
 
-/// So few points are compared faster than they are searched.
+/// Up to so many points, comparing all is faster than a search.
 const FEW_POINTS: usize = 16;
 
 /// The largest number of points: enough for any map, and few enough for the settings of a file.

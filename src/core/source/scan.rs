@@ -88,7 +88,7 @@ pub fn value_range(
     Ok(Some(range).filter(|(lo, hi)| lo <= hi))
 }
 
-/// Scans every sample of a frame, and adds the result to `seen`. Runs of rows are scanned in parallel and joined in order.
+/// Scans every sample of a frame, and adds the result to `seen`. Runs of rows are scanned in parallel, unless the frame is small, and joined in order.
 pub fn scan_frame(
     seen: Scan,
     window: &dyn FrameWindow,

@@ -330,7 +330,7 @@ impl SchemeSelector<'_> {
         orders
     }
 
-    /// The learned functions, from rows all over the volume instead of the boxes used for trials.
+    /// The learned functions, from rows all over the volume in which samples change, and not from the boxes of trials.
     fn functions(&self) -> Result<Vec<i16>> {
         let size = [self.archive.grid.dims[0], 1, 1];
         let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
@@ -430,7 +430,9 @@ impl SchemeSelector<'_> {
 
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.frames();
-        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, self.edge);
+        let block: [usize; 3] = self.archive.grid.dims.map(|n| n.min(self.edge));
+        let voxels = block.iter().product();
+        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, voxels);
         codec.missing_value = self.config.missing_value;
         codec.lists = self.lists;
         codec
@@ -461,7 +463,7 @@ fn variants(best: &Scheme, of: impl Fn(&Pyramid) -> Vec<Pyramid>) -> Vec<Scheme>
 const ROWS: usize = 64;
 const LEARNING: usize = 1000;
 
-/// Functions are learned for this many voxels and more.
+/// Functions are learned for this many series and more.
 const LEAST_SERIES: usize = 16;
 
 /// A scheme is tuned only if its estimate is at most this many times the smallest.

@@ -35,10 +35,10 @@ pub(super) struct Boxes {
     pub(super) voxels: f64,
 }
 
-/// The boxes in which samples change.
+/// The boxes in which samples change, and others if these are few.
 pub(super) struct Active {
     pub(super) numbers: Vec<usize>,
-    /// The share of all places where samples change; 1 if none was found.
+    /// The share of the places looked at that they stand for; 1 if samples change in none.
     share: f64,
 }
 
@@ -99,17 +99,18 @@ impl TrialBoxes<'_> {
                 break;
             }
         }
-        let all = numbers.len() + quiet.len();
-        let share = if numbers.is_empty() { 1.0 } else { numbers.len() as f64 / all as f64 };
+        let (is_any, all) = (!numbers.is_empty(), numbers.len() + quiet.len());
         quiet.truncate(count - numbers.len());
         numbers.append(&mut quiet);
+        let share = if is_any { numbers.len() as f64 / all as f64 } else { 1.0 };
         Ok(Active { numbers, share })
     }
 
-    /// Whether one value is within the bound of all samples of a box, as far as a few frames show.
+    /// Whether all samples of a box are within the bound of one value, as far as a few frames show.
     fn is_quiet(&self, number: usize, size: [usize; 3]) -> Result<bool> {
         let (window, region) = (self.window(number), self.place(number, size).region);
-        let frames = [0, window.frames() / 2, window.frames() - 1];
+        let mut frames = vec![0, window.frames() / 2, window.frames() - 1];
+        frames.dedup();
         let (mut samples, mut range) = (vec![0; region.voxels() * self.archive.sample.size()], NOTHING);
         for frame in frames {
             window.read_box(frame, &region, &mut samples)?;
@@ -208,7 +209,7 @@ const SHARE: usize = 50;
 const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
 
-/// So many places are looked at for each box, until one is found where samples change.
+/// At most so many places are looked at for each wanted box.
 const CANDIDATES: usize = 16;
 
 /// At most one voxel in this many is used for trials.
