@@ -108,29 +108,40 @@ impl Listed {
         }
     }
 
-    /// The predictor that makes the codes of some frames smallest, and about how many bytes those of all take.
-    fn best(&self, base: u16, codes: &mut Vec<i32>) -> (usize, Predictor) {
-        let all = self.extents[3];
-        let some = all.div_ceil(FRAMES_OF_ONE).max(FEW_FRAMES).min(all);
-        let first = (all - some).div_ceil(2);
-        let estimated = |predictor| {
-            self.codes(predictor, base, first..first + some, codes);
-            (Packing::Nested.estimate(&self.boxes(codes)) * all / some, predictor)
+    /// The predictor that makes the codes of some frames smallest.
+    fn best(&self, base: u16, codes: &mut Vec<i32>) -> Predictor {
+        let [x, y, z, frames] = self.extents;
+        let rest = frames - 1;
+        let some = rest.div_ceil(FRAMES_PER_COMPARED).max(FEW_SAMPLES.div_ceil(x * y * z)).min(rest);
+        let first = 1 + (rest - some) / 2;
+        let mut bytes = |predictor, frames| {
+            self.codes(predictor, base, frames, codes);
+            Packing::Nested.estimate(&self.boxes(codes))
         };
-        let estimates = Predictor::ALL.map(estimated);
-        estimates.into_iter().min_by_key(|of| of.0).unwrap_or((0, Predictor::Base))
+        let estimated = |predictor: &Predictor| {
+            let of_rest = if rest > 0 { bytes(*predictor, first..first + some) * rest / some } else { 0 };
+            bytes(*predictor, 0..1) + of_rest
+        };
+        Predictor::ALL.into_iter().min_by_key(estimated).unwrap_or(Predictor::Base)
+    }
+
+    /// The codes of all frames by the best predictor.
+    fn best_codes(&self, base: u16, codes: &mut Vec<i32>) -> Predictor {
+        let predictor = self.best(base, codes);
+        self.codes(predictor, base, 0..self.extents[3], codes);
+        predictor
     }
 
     /// About how many bytes the payload takes. `codes` is scratch.
     pub fn estimate(&self, codes: &mut Vec<i32>) -> usize {
-        FIELDS + self.values.len() + self.best(self.base(), codes).0
+        self.best_codes(self.base(), codes);
+        FIELDS + self.values.len() + Packing::Nested.estimate(&self.boxes(codes))
     }
 
     /// Appends the payload with the predictor that makes some frames smallest. `codes` is scratch.
     pub fn pack(&self, codes: &mut Vec<i32>, out: &mut Vec<u8>) {
         let base = self.base();
-        let (_, predictor) = self.best(base, codes);
-        self.codes(predictor, base, 0..self.extents[3], codes);
+        let predictor = self.best_codes(base, codes);
         out.put_u32((self.values.len() / self.size) as u32);
         out.put_u16(base);
         out.put_u16(predictor as u16);
@@ -233,9 +244,9 @@ pub(crate) fn max_listed(size: usize, extents: [usize; 4]) -> usize {
 /// Bytes of the fields before the values.
 const FIELDS: usize = 8;
 
-/// Predictors are compared in one of so many frames, but in a few at least.
-const FRAMES_OF_ONE: usize = 8;
-const FEW_FRAMES: usize = 2;
+/// Predictors are compared in the first frame and in one of so many others, but in at least [`FEW_SAMPLES`] if there are so many.
+const FRAMES_PER_COMPARED: usize = 8;
+const FEW_SAMPLES: usize = 1 << 16;
 
 /// Slots for values that were found lately, because a hash map is slow; and a factor that spreads values over them.
 const RECENT: usize = 1 << 10;

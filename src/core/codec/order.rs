@@ -30,7 +30,7 @@ impl Order {
         dispatch!(sort_lanes(&mut self.keys[..], &self.networks[levels as usize][..]));
     }
 
-    /// The k of a lane in order.
+    /// The coefficients of a lane, the first to drop first.
     #[inline(always)]
     pub(super) fn of_lane(&self, lane: usize) -> impl Iterator<Item = usize> {
         let keys = self.keys.iter().map(move |keys| keys[lane]).take_while(|key| *key != NONE);
@@ -41,7 +41,8 @@ impl Order {
 /// The sort key of a zero code, larger than any other.
 const NONE: u32 = u32::MAX;
 
-/// Makes a sort key of each coefficient: its size in steps, and in the low bits how much k is less than the largest that they hold.
+/// Makes the sort keys. Their high bits are the coefficient's size in steps. Their low bits count k backwards, so that the finer of two
+/// nearly equal ones comes first.
 #[inline(always)]
 fn make_keys(codes: &[[i32; LANES]], coefficients: &[Lane], step: f64, low: u32, keys: &mut Vec<[u32; LANES]>) {
     let per_step = 1.0 / step;

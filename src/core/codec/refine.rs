@@ -52,9 +52,10 @@ impl Checked {
 
     /// Whether outliers are more than a few of the block's samples, and take a large share of the bytes beside `codes`.
     fn has_many_outliers(&self, samples: usize, codes: &[i32]) -> bool {
-        let is_large =
-            |outliers: usize| outliers > samples / FEW_OUTLIERS && outliers * CODES_PER_OUTLIER > count(codes);
-        self.tally.as_ref().is_none_or(|tally| is_large(tally.outliers.len()))
+        self.tally.as_ref().is_none_or(|tally| {
+            let outliers = tally.outliers.len();
+            outliers > samples / FEW_OUTLIERS && outliers * CODES_PER_OUTLIER > count(codes)
+        })
     }
 }
 
@@ -133,21 +134,22 @@ impl Source<'_> {
         Some(Coded { step, marked, parts, dropped: tally.squared_error, outliers, tally })
     }
 
-    /// The block with zeros in place of the nodes above and its own, if its samples are within the bound of that.
+    /// The block decoded to zeros, in place of its own nodes and those above, if that is within its bound.
     fn zero<R: Real>(&self, weighing: &QuantizerSetup, field: &mut [R]) -> Option<Coded> {
         let by_sample = self.zero_by_sample();
         if by_sample.is_some() || !self.is_small() {
             return by_sample;
         }
         field.fill(R::default());
-        self.zeros(self.compared(weighing, field, &vec![false; self.codec.basis.coefficients()])?)
+        let tally = self.compared(weighing, field, &vec![false; self.codec.basis.coefficients()])?;
+        tally.outliers.is_empty().then(|| self.zeros(tally))
     }
 
-    /// The block without codes, if the bound is one of single samples, and they are within it.
+    /// The block decoded to zeros, if the bound is one of single samples, and they are within it.
     pub(super) fn zero_by_sample(&self) -> Option<Coded> {
         let by_sample = self.codec.bound.measure() == Measure::Largest && !self.codec.is_missing(0.0);
         let applies = by_sample && self.is_small();
-        applies.then(|| self.zeros(Tally::of_zeros(self.codec, &self.samples, self.missing))).flatten()
+        applies.then(|| self.zeros(Tally::of_zeros(self.codec, &self.samples, self.missing)))
     }
 
     /// Whether the largest sample of a block of tier 0 is within the bound of zero.
@@ -156,12 +158,11 @@ impl Source<'_> {
         self.codec.tier == 0 && magnitude <= self.codec.bound.allowed(magnitude)
     }
 
-    /// The block without codes, if its tally has no outliers.
-    fn zeros(&self, tally: Tally) -> Option<Coded> {
+    /// The block without codes.
+    fn zeros(&self, tally: Tally) -> Coded {
         let parts = Some(vec![PartStats { count: 0, energy: 0.0, largest: 0.0 }; self.codec.parts()]);
         let (dropped, outliers) = (tally.squared_error, Outliers::default());
-        let marked = Vec::new();
-        tally.outliers.is_empty().then_some(Coded { step: 0.0, marked, parts, dropped, outliers, tally })
+        Coded { step: 0.0, marked: Vec::new(), parts, dropped, outliers, tally }
     }
 
     /// Compares a field with the source; it is zero for each k that is not marked. None if too many samples miss the bound.
@@ -338,8 +339,8 @@ const SAMPLING: usize = 3;
 /// than a sample of an exact block.
 const MOST_OUTLIERS: usize = 8;
 
-/// Finer steps are tried if more than one sample in this many misses the bound. Fewer cost few bytes, and each try takes as long
-/// as coding the block.
+/// Finer steps are tried if more than one sample in this many misses the bound. With fewer, a try is not worth its time, which is that of
+/// coding the block.
 const FEW_OUTLIERS: usize = 1 << 14;
 
 /// A finer step is tried if fewer codes than this come with an outlier. An outlier takes as many bytes as about eight.

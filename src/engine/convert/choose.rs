@@ -289,7 +289,7 @@ impl SchemeSelector<'_> {
         let SchemeConstraint { basis, space } = self.config.coding;
         let stencil = if let SpatialPredictor::Pyramid(stencil) = space { stencil } else { Stencil::Cubic };
         let along_time = match basis {
-            // Other transforms are never the smallest, and for a few series functions take too much.
+            // Other transforms are never the smallest. For a few series, the functions themselves take too many bytes.
             None => (self.frames() > 1 && self.boxes().voxels() >= LEAST_SERIES).then_some(Basis::Learned),
             Some(Basis::Samples) => None,
             forced => forced,
@@ -335,8 +335,8 @@ impl SchemeSelector<'_> {
         let size = [self.archive.grid.dims[0], 1, 1];
         let rows = ROWS.min(self.most / (size[0] * self.frames())).max(1);
         let boxes = self.boxes();
-        let numbers = boxes.active(LEARNING, rows, size)?.numbers;
-        let samples = numbers.into_iter().map(|number| boxes.sampled(number, size)).collect::<Result<Vec<_>>>()?;
+        let places = boxes.active(LEARNING, rows, size)?.places;
+        let samples = places.iter().map(|place| boxes.sampled(place)).collect::<Result<Vec<_>>>()?;
         let (ty, frames) = (self.archive.sample, self.frames());
         let samples = samples.iter().map(|row| &row.samples[..]);
         Ok(learned_functions(samples, ty, frames, self.config.missing_value, &self.promise))

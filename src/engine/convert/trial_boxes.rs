@@ -31,14 +31,14 @@ pub(super) struct Sampled {
 /// Boxes, and how much they stand for.
 pub(super) struct Boxes {
     pub(super) sampled: Vec<Sampled>,
-    /// The voxels of the channels, less those like boxes that were passed over.
+    /// The voxels that they stand for: those of all channels, less a share in which samples do not change.
     pub(super) voxels: f64,
 }
 
 /// The boxes in which samples change, and others if these are few.
 pub(super) struct Active {
-    pub(super) numbers: Vec<usize>,
-    /// The share of the places looked at that they stand for; 1 if samples change in none.
+    pub(super) places: Vec<BoxPlace>,
+    /// The number of boxes divided by that of the places looked at; 1 if samples change in none.
     share: f64,
 }
 
@@ -84,49 +84,55 @@ impl TrialBoxes<'_> {
         let (voxels, most) = (self.voxels_of(size), self.most_voxels(size));
         let volume = voxels.iter().product::<usize>();
         let count = (self.voxels() / SHARE / volume).clamp(self.least(), MOST_BOXES).min(most / volume).max(1);
-        let Active { numbers, share } = self.active(0, count, voxels)?;
-        let sampled = numbers.into_iter().map(|number| self.sampled(number, voxels)).collect::<Result<_>>()?;
+        let Active { places, share } = self.active(0, count, voxels)?;
+        let sampled = places.iter().map(|place| self.sampled(place)).collect::<Result<_>>()?;
         Ok(Boxes { sampled, voxels: self.voxels() as f64 * share })
     }
 
-    /// The numbers, from `first` on, of `count` boxes of a size in which samples change, or others if too few are found.
+    /// The places of `count` boxes of a size in which samples change, or others if too few are found. Looks from place `first` on.
     pub(super) fn active(&self, first: usize, count: usize, size: [usize; 3]) -> Result<Active> {
-        let (mut numbers, mut quiet) = (Vec::new(), Vec::new());
+        let (mut places, mut quiet) = (Vec::new(), Vec::new());
         for number in (first..).take(count * CANDIDATES) {
-            let to = if self.is_quiet(number, size)? { &mut quiet } else { &mut numbers };
-            to.push(number);
-            if numbers.len() == count {
+            // Blocks at far faces are followed by no other voxels. They are taken for every second box.
+            let place = self.place(number, size, places.len().is_multiple_of(2));
+            let to = if self.is_quiet(&place)? { &mut quiet } else { &mut places };
+            to.push(place);
+            if places.len() == count {
                 break;
             }
         }
-        let (is_any, all) = (!numbers.is_empty(), numbers.len() + quiet.len());
-        quiet.truncate(count - numbers.len());
-        numbers.append(&mut quiet);
-        let share = if is_any { numbers.len() as f64 / all as f64 } else { 1.0 };
-        Ok(Active { numbers, share })
+        let (is_any, all) = (!places.is_empty(), places.len() + quiet.len());
+        quiet.truncate(count - places.len());
+        places.append(&mut quiet);
+        let share = if is_any { places.len() as f64 / all as f64 } else { 1.0 };
+        Ok(Active { places, share })
     }
 
-    /// Whether all samples of a box are within the bound of one value, as far as a few frames show.
-    fn is_quiet(&self, number: usize, size: [usize; 3]) -> Result<bool> {
-        let (window, region) = (self.window(number), self.place(number, size).region);
-        let mut frames = vec![0, window.frames() / 2, window.frames() - 1];
+    /// Whether one value is within the bound of all samples of a box, judged by a few frames.
+    fn is_quiet(&self, place: &BoxPlace) -> Result<bool> {
+        let window = self.channels[place.channel];
+        let mut frames = LOOKED_AT.map(|share| ((window.frames() - 1) as f64 * share) as usize).to_vec();
         frames.dedup();
-        let (mut samples, mut range) = (vec![0; region.voxels() * self.archive.sample.size()], NOTHING);
+        let mut samples = vec![0; place.region.voxels() * self.archive.sample.size()];
+        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
         for frame in frames {
-            window.read_box(frame, &region, &mut samples)?;
+            window.read_box(frame, &place.region, &mut samples)?;
             let of_frame = sample::range_of_present(self.archive.sample, &samples, self.missing_value, |_| {});
             range = sample::join_ranges(range, of_frame);
+            let (lo, hi) = range;
+            let nearest_zero = if lo <= 0.0 && hi >= 0.0 { 0.0 } else { lo.abs().min(hi.abs()) };
+            if hi - lo > 2.0 * self.bound.allowed(nearest_zero) {
+                return Ok(false);
+            }
         }
-        let (lo, hi) = range;
-        let nearest_zero = if lo <= 0.0 && hi >= 0.0 { 0.0 } else { lo.abs().min(hi.abs()) };
-        Ok(lo > hi || hi - lo <= 2.0 * self.bound.allowed(nearest_zero))
+        Ok(true)
     }
 
     /// Voxels of a box along x, y, z.
     pub(super) fn voxels_of(&self, size: BoxSize) -> [usize; 3] {
         let (most, least) = (self.most_voxels(size), self.least());
         let fits = |edge: &&usize| {
-            let is_large = **edge > SMALL_EDGE && size == BoxSize::Small && !self.is_rough; // estimates need larger boxes
+            let is_large = **edge > SMALL_EDGE && size == BoxSize::Small && !self.is_rough; // rough choices have no larger boxes later
             let most = if is_large { most.min(self.voxels() / LARGEST_SHARE_OF_LARGE) } else { most };
             least * self.voxels_of_edge(**edge).iter().product::<usize>() <= most
         };
@@ -161,43 +167,38 @@ impl TrialBoxes<'_> {
         (self.voxels() / LARGEST_SHARE).min(most / self.frames())
     }
 
-    /// Reads the box with this number.
-    pub(super) fn sampled(&self, number: usize, size: [usize; 3]) -> Result<Sampled> {
-        let BoxPlace { region, outer, size } = self.place(number, size);
-        let window = self.window(number);
+    /// Reads a box.
+    pub(super) fn sampled(&self, place: &BoxPlace) -> Result<Sampled> {
+        let &BoxPlace { channel, region, outer, size } = place;
+        let window = self.channels[channel];
         let samples = read_frames(window, 0..window.frames(), &region, self.archive.sample)?;
         Ok(Sampled { size, outer, samples })
     }
 
-    /// The channel of a box: channels take turns.
-    fn window(&self, number: usize) -> &dyn FrameWindow {
-        self.channels[number % self.channels.len()]
-    }
-
-    /// The place of a box: one of an evenly spread sequence, the same for every window.
-    fn place(&self, number: usize, size: [usize; 3]) -> BoxPlace {
+    /// The place with this number of an evenly spread sequence, the same for every window. Channels take turns.
+    fn place(&self, number: usize, size: [usize; 3], is_at_far_face: bool) -> BoxPlace {
         let dims = self.archive.grid.dims;
-        // Blocks at far faces are followed by no other voxels. They are taken for every second box.
         let ghosts = self.pyramid.ghost_nodes(size);
         let outer = std::array::from_fn(|axis| size[axis] + ghosts[axis]); // the voxels that coding a box by any pyramid takes
-        let ends = if number.is_multiple_of(2) { size } else { outer };
+        let ends = if is_at_far_face { size } else { outer };
         let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
         let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
-        BoxPlace { region, outer, size: BlockWithGhosts { size, known } }
+        BoxPlace { channel: number % self.channels.len(), region, outer, size: BlockWithGhosts { size, known } }
     }
 }
 
 /// Where a box is.
-struct BoxPlace {
+pub(super) struct BoxPlace {
+    channel: usize,
     region: Region,
     /// The voxels that pyramids may use.
     outer: [usize; 3],
     size: BlockWithGhosts,
 }
 
-/// The range of no samples.
-const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+/// The frames that show whether samples change, as shares of the window: unevenly spaced, so that they see oscillations.
+const LOOKED_AT: [f64; 7] = [0.0, 0.13, 0.31, 0.47, 0.62, 0.83, 1.0];
 
 /// The number of samples that may always be read.
 const FEW_SAMPLES: usize = 1 << 17;
@@ -215,6 +216,6 @@ const CANDIDATES: usize = 16;
 /// At most one voxel in this many is used for trials.
 const LARGEST_SHARE: usize = 8;
 
-/// Larger boxes are taken only if they are at most one voxel in so many.
+/// Small boxes with a longer edge than this are taken only if all together are at most one voxel in [`LARGEST_SHARE_OF_LARGE`].
 const SMALL_EDGE: usize = 16;
 const LARGEST_SHARE_OF_LARGE: usize = 16;
