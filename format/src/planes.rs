@@ -5,7 +5,7 @@ pub(crate) fn bitmap_len(total: usize) -> usize {
     total.div_ceil(8)
 }
 
-/// Appends a bitmap of which values are set, least significant bit first, padding bits zero.
+/// Appends a bit for each value, 1 if it is set: the first value in the lowest bit of the first byte, padding bits zero.
 pub(crate) fn pack_bits<T: Copy>(values: &[T], is_set: impl Fn(T) -> bool, out: &mut Vec<u8>) {
     let (bytes, last) = values.as_chunks::<8>();
     out.extend(bytes.iter().map(|values| byte_of(values.map(|value| u8::from(is_set(value))))));

@@ -10,7 +10,8 @@
 //! Two misprints of the paper are corrected here. Its eq 6 sums the kept coefficients; the error is the sum over the
 //! dropped ones. Its loop drops coefficients until the error reaches the tolerance, and keeps the set whose error
 //! already does: one coefficient too few. The rule here: drop one coefficient after another, the smallest first, until
-//! the next would exceed the bound. In long windows, a few such coefficients are kept and passed over. If zero is within the bound of a series, the series keeps none.
+//! the next would exceed the bound. In long windows, a few such coefficients are kept and passed over. If zero is within
+//! the bound of a series, the series keeps none.
 //!
 //! Eq 6 needs an orthonormal basis, a bound of the mean, and unrounded coefficients. This code needs none of them: it
 //! quantises first, and follows the error of every sample. Dropping the code q_k changes it to

@@ -290,7 +290,7 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// The blocks whose blocks above must be decoded whole. A block of which only a tiny part is decoded needs parts of them.
+    /// The blocks that need the whole block above them. Blocks of which only a tiny part is decoded need a part of it.
     fn sharing<'e>(
         &self,
         codec: &WindowCodec,
