@@ -73,7 +73,7 @@ fn the_chosen_scheme_is_nearly_the_smallest() {
             let (window, codec) = (&file.metadata().windows[0], file.codec(0).unwrap());
             let mut encoder = Encoder::new(3).unwrap();
             let mut coded = |scheme: Scheme| {
-                let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, codec.bound, EDGE.pow(3));
+                let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, codec.bound, EDGE);
                 let id = BlockId::new(0, 0, 0);
                 size(&encoder.block(&codec, id, [EDGE; 3], samples[..].into(), None).unwrap().block.parts)
             };

@@ -181,7 +181,7 @@ mod tests {
 
     fn codec() -> WindowCodec {
         let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
-        WindowCodec::new(Scheme::along_time(Basis::Samples), FRAMES, SampleType::F32, bound, 512)
+        WindowCodec::new(Scheme::along_time(Basis::Samples), FRAMES, SampleType::F32, bound, 8)
     }
 
     fn samples(voxels: [usize; 3]) -> Vec<u8> {

@@ -361,7 +361,7 @@ mod tests {
         sample::store(SampleType::F32, &values, &mut bytes);
         for (bound, delta) in [(Bound::Pointwise, 1.5), (Bound::Relative { floor: 3.0 }, 1.5)] {
             let bound = ErrorBound { bound, tolerance: 0.5, delta };
-            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, SampleType::F32, bound, 512);
+            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, SampleType::F32, bound, 8);
             for declared in [None, Some(f64::from(values[40] as f32))] {
                 codec.missing_value = declared;
                 let (samples, missing) =
@@ -398,7 +398,7 @@ mod tests {
         (decoded[3][1], decoded[9][4], decoded[20][6]) = (f64::NAN, -9.5, f64::INFINITY);
         let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta };
         for (ty, count) in [(SampleType::F32, LANES), (SampleType::F64, 7), (SampleType::I16, LANES)] {
-            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, ty, bound, 512);
+            let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, ty, bound, 8);
             codec.missing_value = Some(-9.5);
             let compared = Compared { source: &source, decoded: &decoded };
             let (mut fast, mut slow) = (Tally::new(), Tally::new());

@@ -102,10 +102,10 @@ pub struct WindowCodec {
 }
 
 impl WindowCodec {
-    /// Creates the codec of a window of `frames` frames. Blocks have at most so many voxels.
-    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, bound: ErrorBound, voxels: usize) -> Self {
+    /// Creates the codec of a window of `frames` frames. Blocks have at most `edge` voxels a side.
+    pub fn new(scheme: Scheme, frames: usize, sample: SampleType, bound: ErrorBound, edge: usize) -> Self {
         let basis = scheme.time_basis(frames);
-        let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), voxels) };
+        let levels = if scheme.pyramid.is_some() { Vec::new() } else { join_levels(&basis.levels(), edge) };
         Self::with_levels(scheme, basis, sample, bound, &levels)
     }
 
@@ -276,12 +276,12 @@ const ODD_FRAMES: usize = Pyramid::PARTS as usize - 1;
 /// Small coarse levels are joined until a part of a whole block holds at least this many coefficients.
 const PART_COEFFICIENTS: usize = 1 << 17;
 
-fn join_levels(levels: &[usize], voxels: usize) -> Vec<usize> {
+fn join_levels(levels: &[usize], edge: usize) -> Vec<usize> {
     let mut parts = Vec::new();
     let mut open = 0;
     for level in levels {
         open += level;
-        if open * voxels >= PART_COEFFICIENTS {
+        if open * edge * edge * edge >= PART_COEFFICIENTS {
             parts.push(std::mem::take(&mut open));
         }
     }
@@ -304,8 +304,8 @@ mod tests {
 
     #[test]
     fn small_levels_are_joined() {
-        assert_eq!(join_levels(&[1, 1, 2, 4, 8, 16], 1 << 15), [4, 4, 8, 16]);
-        assert_eq!(join_levels(&[1, 1, 2, 4, 8, 16], 64), [32]);
-        assert_eq!(join_levels(&[1], 1 << 18), [1]);
+        assert_eq!(join_levels(&[1, 1, 2, 4, 8, 16], 32), [4, 4, 8, 16]);
+        assert_eq!(join_levels(&[1, 1, 2, 4, 8, 16], 4), [32]);
+        assert_eq!(join_levels(&[1], 64), [1]);
     }
 }

@@ -391,7 +391,7 @@ mod tests {
             for basis in [Basis::Learned, Basis::Samples] {
                 let functions = if basis == Basis::Learned { vec![20000; frames] } else { Vec::new() };
                 let mut codec =
-                    WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 512);
+                    WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 8);
                 codec.missing_value = declared;
                 let samples = BoxSamples::new(ty, &bytes, of, size);
                 let around = Missing::find(&codec, &bytes);

@@ -212,7 +212,7 @@ mod tests {
             let functions = if learned { (0..3 * frames).map(|i| (number(i) / 10.0_f64.powi(scale) * 9e3) as i16).collect() } else { Vec::new() };
             let basis = if learned { Basis::Learned } else { Basis::Samples };
             let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 10.0_f64.powi(scale) };
-            let codec = WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 512);
+            let codec = WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 8);
             let k = codec.basis.coefficients();
             let values: Vec<f64> = (0..frames * voxels).map(|i| number(i + 77)).collect();
             let mut bytes = vec![0; values.len() * ty.size()];

@@ -133,7 +133,7 @@ mod tests {
                 tiers: 0,
             };
             let scheme = Scheme { pyramid: Some(pyramid.clone()), coarseness, ..Scheme::along_time(basis) };
-            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 1 << 15);
+            let codec = WindowCodec::new(scheme, FRAMES, SampleType::F32, bound, 32);
             let mut encoder = Encoder::new(3).expect("a usual level");
             let id = BlockId::new(0, 0, 0);
             let encoded = encoder.block(&codec, id, SIZE, samples[..].into(), None).expect("a small block");

@@ -420,7 +420,7 @@ mod tests {
                 [(Bound::Pointwise, 0), (Bound::Rms, 0), (Bound::Relative { floor: 0.1 }, 1), (Bound::Rms, 1)]
             {
                 let bound = ErrorBound { bound, tolerance: 0.1, delta: 0.1 };
-                let codec = WindowCodec::new(Scheme::along_time(basis), frames, SampleType::F64, bound, 512);
+                let codec = WindowCodec::new(Scheme::along_time(basis), frames, SampleType::F64, bound, 8);
                 let step = bound.step(0.1, codec.gain);
                 let (mut group, mut truncation) = (Group::new(&codec), Truncation::new(&codec, step));
                 for seed in 0..640 / frames.max(32) {

@@ -430,8 +430,7 @@ impl SchemeSelector<'_> {
 
     fn codec(&self, scheme: &Scheme) -> WindowCodec {
         let frames = self.frames();
-        let voxels = self.edge.pow(3); // also of smaller volumes, so that views can leave out their finer levels
-        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, voxels);
+        let mut codec = WindowCodec::new(scheme.clone(), frames, self.archive.sample, self.promise, self.edge);
         codec.missing_value = self.config.missing_value;
         codec.lists = self.lists;
         codec
