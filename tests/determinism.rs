@@ -96,9 +96,9 @@ const DIGESTS: [u64; 13] = [
     0x8f78_1f4b_e9d2_506e,
     0x41a3_eda1_42a1_b847,
     0x8d19_460f_0d65_5590,
-    0x5ed1_9d45_cb74_912e,
-    0xad86_5735_6cf6_b2f9,
-    0x28f3_219c_79ec_3fa8,
+    0xc3ab_b657_a03a_2d37,
+    0x3e78_d1f7_e6a5_bbcc,
+    0xcc87_3e79_4a4f_213f,
 ];
 
 #[test]

@@ -341,7 +341,7 @@ const MOST_OUTLIERS: usize = 8;
 
 /// Finer steps are tried if more than one sample in this many misses the bound. With fewer, a try is not worth its time, which is that of
 /// coding the block.
-const FEW_OUTLIERS: usize = 1 << 14;
+const FEW_OUTLIERS: usize = 512;
 
 /// A finer step is tried if fewer codes than this come with an outlier. An outlier takes as many bytes as about eight.
 const CODES_PER_OUTLIER: usize = 8;

@@ -1,6 +1,6 @@
 //! The reader stage: reads windows of frames and sends blocks.
 
-use super::choose::SchemeSelector;
+use super::candidates::SchemeSelector;
 use super::coarse::CoarseBlocks;
 use super::coded_input::{BRIGHTNESS, CodedInput};
 use super::sampled::{self, Pixel};

@@ -15,6 +15,7 @@
 //! conversion leaves a file that is valid up to its last complete window, and [`convert_into`] continues there. Each window's
 //! record holds all that the next window needs, so the resumed file has the same bytes as an uninterrupted one.
 
+mod candidates;
 mod choose;
 mod coarse;
 mod coded_blocks;

@@ -1,6 +1,7 @@
 //! Boxes of a window's samples in which schemes are tried.
 
 use super::spread::evenly;
+use std::cmp::Reverse;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::sample::{self, SampleType};
@@ -90,42 +91,53 @@ impl TrialBoxes<'_> {
     }
 
     /// The places of `count` boxes of a size in which samples change, or others if too few are found. Looks from place `first` on.
+    /// Takes boxes that change the most and boxes that change less.
     pub(super) fn active(&self, first: usize, count: usize, size: [usize; 3]) -> Result<Active> {
-        let (mut places, mut quiet) = (Vec::new(), Vec::new());
-        for number in (first..).take(count * CANDIDATES) {
-            // Blocks at far faces are followed by no other voxels. They are taken for every second box.
-            let place = self.place(number, size, places.len().is_multiple_of(2));
-            let to = if self.is_quiet(&place)? { &mut quiet } else { &mut places };
-            to.push(place);
-            if places.len() == count {
+        let (mut active, mut quiet) = (Vec::new(), Vec::new());
+        for number in first..first + count * MOST_CANDIDATES {
+            let place = self.place(number, size);
+            match self.changes(&place)? {
+                0 => quiet.push(place),
+                changes => active.push((changes, place)),
+            }
+            if number + 1 >= first + count * CANDIDATES && active.len() >= count {
                 break;
             }
         }
-        let (is_any, all) = (!places.is_empty(), places.len() + quiet.len());
-        quiet.truncate(count - places.len());
-        places.append(&mut quiet);
-        let share = if is_any { places.len() as f64 / all as f64 } else { 1.0 };
+        let (found, all) = (active.len(), active.len() + quiet.len());
+        active.sort_by_key(|(changes, _)| Reverse(*changes));
+        let taken = active.into_iter().enumerate().filter(|(i, _)| i * count % found < count);
+        let mut places: Vec<_> = taken.map(|(_, (_, place))| place).collect();
+        places.extend(quiet.into_iter().take(count - places.len()));
+        let share = if found > 0 { found.max(count) as f64 / all as f64 } else { 1.0 };
         Ok(Active { places, share })
     }
 
-    /// Whether one value is within the bound of all samples of a box, judged by a few frames.
-    fn is_quiet(&self, place: &BoxPlace) -> Result<bool> {
-        let window = self.channels[place.channel];
+    /// In how many layers of a few frames the samples of a box change, with time or within the layer; 0 if one value is within the bound
+    /// of all.
+    fn changes(&self, place: &BoxPlace) -> Result<usize> {
+        let (window, ty) = (self.channels[place.channel], self.archive.sample);
         let mut frames = LOOKED_AT.map(|share| ((window.frames() - 1) as f64 * share) as usize).to_vec();
         frames.dedup();
-        let mut samples = vec![0; place.region.voxels() * self.archive.sample.size()];
-        let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+        let [x, y, z] = place.region.dims();
+        let mut samples = vec![0; place.region.voxels() * ty.size()];
+        let (mut of_layers, mut of_all, mut changes) = (vec![NO_RANGE; z], NO_RANGE, 0);
         for frame in frames {
             window.read_box(frame, &place.region, &mut samples)?;
-            let of_frame = sample::range_of_present(self.archive.sample, &samples, self.missing_value, |_| {});
-            range = sample::join_ranges(range, of_frame);
-            let (lo, hi) = range;
-            let nearest_zero = if lo <= 0.0 && hi >= 0.0 { 0.0 } else { lo.abs().min(hi.abs()) };
-            if hi - lo > 2.0 * self.bound.allowed(nearest_zero) {
-                return Ok(false);
+            for (before, layer) in of_layers.iter_mut().zip(samples.chunks_exact(x * y * ty.size())) {
+                let range = sample::range_of_present(ty, layer, self.missing_value, |_| {});
+                changes += usize::from(self.is_wide(sample::join_ranges(*before, range)));
+                (*before, of_all) = (range, sample::join_ranges(of_all, range));
             }
         }
-        Ok(true)
+        Ok(if self.is_wide(of_all) { changes + 1 } else { 0 })
+    }
+
+    /// Whether no value is within the bound of all samples of a range.
+    fn is_wide(&self, range: (f64, f64)) -> bool {
+        let (lo, hi) = range;
+        let nearest_zero = if lo <= 0.0 && hi >= 0.0 { 0.0 } else { lo.abs().min(hi.abs()) };
+        hi - lo > 2.0 * self.bound.allowed(nearest_zero)
     }
 
     /// Voxels of a box along x, y, z.
@@ -176,11 +188,11 @@ impl TrialBoxes<'_> {
     }
 
     /// The place with this number of an evenly spread sequence, the same for every window. Channels take turns.
-    fn place(&self, number: usize, size: [usize; 3], is_at_far_face: bool) -> BoxPlace {
+    fn place(&self, number: usize, size: [usize; 3]) -> BoxPlace {
         let dims = self.archive.grid.dims;
         let ghosts = self.pyramid.ghost_nodes(size);
         let outer = std::array::from_fn(|axis| size[axis] + ghosts[axis]); // the voxels that coding a box by any pyramid takes
-        let ends = if is_at_far_face { size } else { outer };
+        let ends = if number.is_multiple_of(2) { size } else { outer }; // blocks at far faces are followed by no other voxels
         let known: [usize; 3] = std::array::from_fn(|axis| ends[axis].min(dims[axis]));
         let start = evenly(number, std::array::from_fn(|axis| dims[axis] - known[axis] + 1));
         let region = Region { start, end: std::array::from_fn(|axis| start[axis] + known[axis]) };
@@ -200,6 +212,9 @@ pub(super) struct BoxPlace {
 /// The frames that show whether samples change, as shares of the window: unevenly spaced, so that they see oscillations.
 const LOOKED_AT: [f64; 7] = [0.0, 0.13, 0.31, 0.47, 0.62, 0.83, 1.0];
 
+/// Of no samples.
+const NO_RANGE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
 /// The number of samples that may always be read.
 const FEW_SAMPLES: usize = 1 << 17;
 
@@ -210,8 +225,9 @@ const SHARE: usize = 50;
 const LEAST_BOXES: usize = 2;
 const MOST_BOXES: usize = 12;
 
-/// At most so many places are looked at for each wanted box.
-const CANDIDATES: usize = 16;
+/// For each wanted box, so many places are looked at, and more if samples change in too few.
+const CANDIDATES: usize = 4;
+const MOST_CANDIDATES: usize = 16;
 
 /// At most one voxel in this many is used for trials.
 const LARGEST_SHARE: usize = 8;
