@@ -1,4 +1,5 @@
-//! The error bounds (eq 21-23), searched for series that break them. Nothing here calls the library's own bound.
+//! The error bounds (eq 21-23) and what is kept beside them, searched for series that break them. Nothing here calls the library's own
+//! bound.
 
 use crate::common::exact::Limit;
 use crate::common::memory::Memory;
@@ -8,6 +9,7 @@ use crate::common::{BASES, Stored, cases, extracted, is_taken, settings, stored,
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
+use std::ops::Range;
 use std::time::Instant;
 use wavesplat::base::grid::Grid;
 use wavesplat::base::progress::Silent;
@@ -17,6 +19,7 @@ use wavesplat::file::CoefficientFile;
 use wavesplat::file::verify::verify;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::decode::WantedFrames;
+use wavesplat_format::Keep;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Case {
@@ -44,11 +47,30 @@ pub(crate) struct Trial {
 }
 
 impl Case {
-    fn config(&self) -> wavesplat::convert::ConvertConfig {
+    /// Keeps the range, and the sides of values that occur, of their mean, and of 0; nothing for some seeds.
+    fn keep(&self, source: &[f64]) -> Keep {
+        let place = |n: u64| {
+            (self.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(7 * n as u32) % source.len() as u64) as usize
+        };
+        let present = |n: u64| source.iter().cycle().skip(place(n)).take(source.len()).copied().find(|v| v.is_finite());
+        let (Some(a), Some(b)) = (present(1), present(2)) else { return Keep::default() };
+        let values = match self.seed % 4 {
+            0 => return Keep::default(),
+            1 => vec![0.0],
+            2 => vec![a, 0.5 * a + 0.5 * b],
+            _ => vec![b, 0.0, 0.25 * a + 0.75 * b],
+        };
+        let words: Vec<String> = values.iter().map(|value| format!("side={value}")).collect();
+        let range = if self.seed % 5 > 2 { " range" } else { "" };
+        Keep::parse(&(words.join(" ") + range)).unwrap()
+    }
+
+    fn config(&self, source: &[f64]) -> wavesplat::convert::ConvertConfig {
         let window = (1 << self.window) + usize::from(self.basis == Basis::Multi);
         let missing_value = if let Mask::Declared(value) = self.mask { Some(value) } else { None };
         let plain = settings(self.basis, window, self.tolerance);
-        wavesplat::convert::ConvertConfig { bound: self.bound, block: Some(self.edge), missing_value, ..plain }
+        let (bound, block, keep) = (self.bound, Some(self.edge), self.keep(source));
+        wavesplat::convert::ConvertConfig { bound, block, missing_value, keep, ..plain }
     }
 
     fn check(&self) -> usize {
@@ -60,13 +82,13 @@ impl Case {
     pub(crate) fn trial(&self, bytes: &[u8]) -> Trial {
         let ty = self.ty;
         let mut memory = Memory::new(Grid::unit(self.dims), ty, bytes.to_vec());
-        let config = self.config();
+        let source = numbers(ty, bytes);
+        let config = self.config(&source);
         let stored: Stored = stored(&mut memory, &config);
         let file = stored.open();
         let back = extracted(&file);
         let report = verify(&file, Some(&mut memory), 64 << 20, &Silent).unwrap().against.unwrap();
-        assert_eq!(report.series_outside, 0, "by verify: {self:?} {report:?}");
-        let source = numbers(ty, bytes);
+        assert_eq!((report.series_outside, report.not_kept), (0, 0), "by verify: {self:?} {report:?}");
         let missing: Vec<bool> = source.iter().map(|v| !v.is_finite() || Some(*v) == config.missing_value).collect();
         assert_eq!(report.missing, missing.iter().filter(|m| **m).count() as u64);
         for (i, (a, b)) in bytes.chunks(ty.size()).zip(back.chunks(ty.size())).enumerate() {
@@ -105,8 +127,34 @@ impl Trial {
                 assert!(Limit::of(record.reached).holds(self.found[i], self.source[i]), "sample {i}: beyond reached");
             }
         }
+        self.keeps_sides(frames.clone(), &self.found);
+        self.keeps_range(frames);
         self.splatted(window, &limit);
         voxels
+    }
+
+    /// The samples of some frames that are not missing.
+    fn present(&self, frames: Range<usize>) -> impl Iterator<Item = usize> + Clone {
+        let voxels = self.file.grid.whole().voxels();
+        (frames.start * voxels..frames.end * voxels).filter(|i| !self.missing[*i])
+    }
+
+    /// Checks that `found` has the samples of some frames on their sides.
+    fn keeps_sides(&self, frames: Range<usize>, found: &[f64]) {
+        let sides = self.file.metadata().keep().sides;
+        for i in self.present(frames) {
+            let same = |v: &f64| found[i].partial_cmp(v) == self.source[i].partial_cmp(v);
+            assert!(sides.iter().all(same), "{:?}: {} for {} beside {sides:?}", self.case, found[i], self.source[i]);
+        }
+    }
+
+    /// Checks that samples keep the extremes of their window.
+    fn keeps_range(&self, frames: Range<usize>) {
+        let present = self.present(frames);
+        let [lo, hi] = [f64::min, f64::max].map(|of| present.clone().map(|i| self.source[i]).reduce(of));
+        if self.file.metadata().keep().range {
+            present.for_each(|i| assert!(lo <= Some(self.found[i]) && Some(self.found[i]) <= hi, "{:?}", self.case));
+        }
     }
 
     /// Whether the bound applies to every single sample.
@@ -173,12 +221,16 @@ impl Trial {
                     found[places[*place as usize]] = value;
                     assert_eq!(value, self.source[places[*place as usize]]);
                 }
+                for (place, value) in block.moved(&codec, &block.field(&codec), &WantedFrames::all(&codec)) {
+                    found[places[place]] = value;
+                }
                 let reached = Limit::of(entry.stats.reached);
                 let present = || places.iter().filter(|i| !self.missing[**i]);
                 assert!(present().all(|i| reached.holds(found[*i], self.source[*i])), "beyond the block's reached");
                 assert!(present().all(|i| (entry.stats.min..=entry.stats.max).contains(&self.found[*i])));
             }
         }
+        self.keeps_sides(self.file.window_range(window), &found);
         let voxels = self.file.grid.whole().voxels();
         for voxel in 0..voxels {
             let places: Vec<usize> = self.file.window_range(window).map(|t| t * voxels + voxel).collect();

@@ -13,6 +13,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Basis, Bound, ConvertConfig, SchemeConstraint, SpatialPredictor};
 use wavesplat::file::CoefficientFile;
+use wavesplat_format::Keep;
 
 const FILES: usize = 300;
 
@@ -47,8 +48,9 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let rainbow = TransferFunction::open("rainbow").unwrap();
     let colours = (random.below(8) == 0).then_some(rainbow); // most values lie beyond the ends of the map
     let block = Some(1 + random.below(24));
-    let clip = random.below(3) == 0;
-    let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, clip, ..plain };
+    let words = ["", "", "range", "sign", "side=0.3,0 range", "side=-7,-0.25,0.5,9"][random.below(6)];
+    let keep = if colours.is_some() { Keep::default() } else { Keep::parse(words).unwrap() };
+    let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, keep, ..plain };
     stored(&mut Memory::new(Grid::unit(dims), ty, data), &config).bytes()
 }
 

@@ -72,6 +72,8 @@ pub enum PartKind {
     Exact,
     /// The same, as places in a list of their values.
     Listed,
+    /// On which side of some values samples are that would be decoded on another.
+    Sides,
 }
 
 impl PartKind {
@@ -88,6 +90,7 @@ impl PartKind {
             Self::Missing => [2, 0],
             Self::Exact => [3, 0],
             Self::Listed => [3, 1],
+            Self::Sides => [4, 0],
         }
     }
 
@@ -99,6 +102,7 @@ impl PartKind {
             [2, 0] => Some(Self::Missing),
             [3, 0] => Some(Self::Exact),
             [3, 1] => Some(Self::Listed),
+            [4, 0] => Some(Self::Sides),
             _ => None,
         }
     }
@@ -112,6 +116,7 @@ impl fmt::Display for PartKind {
             Self::Missing => f.write_str("missing samples"),
             Self::Exact => f.write_str("exact samples"),
             Self::Listed => f.write_str("listed samples"),
+            Self::Sides => f.write_str("sides"),
         }
     }
 }
@@ -119,7 +124,7 @@ impl fmt::Display for PartKind {
 /// Statistics of a part, from which a reader decides whether to skip it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartStats {
-    /// Number of nonzero coefficients, outliers, missing samples or samples; at least 1.
+    /// Number of nonzero coefficients, outliers, missing samples, samples, or changes of sides; at least 1.
     pub count: u64,
     /// Sum of squares of the coefficients in the part. With a pyramid: of the changes of all coefficients if this part and
     /// all finer ones are omitted. 0 for parts without coefficients; may overflow to infinity.

@@ -28,6 +28,13 @@ impl<'a> FieldReader<'a> {
         Ok(*head)
     }
 
+    pub(crate) fn take(&mut self, count: usize) -> ParseResult<&'a [u8]> {
+        let short = || format!("ends {} bytes early", count - self.0.len());
+        let (head, tail) = self.0.split_at_checked(count).ok_or_else(short)?;
+        self.0 = tail;
+        Ok(head)
+    }
+
     pub(crate) fn u16(&mut self) -> ParseResult<u16> {
         Ok(u16::from_le_bytes(self.array()?))
     }

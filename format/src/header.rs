@@ -18,15 +18,16 @@ pub(crate) const VERSION: (u16, u16) = (1, 0);
 /// The version of files with any feature.
 const FEATURES_VERSION: (u16, u16) = (1, 1);
 
-/// The version of files with tiers or listed values.
+/// The version of files with tiers, listed values or sides.
 const LATEST_VERSION: (u16, u16) = (1, 2);
 
 /// The required features that this reader supports, by bit, as messages for readers that do not.
-const REQUIRED: [&str; 4] = [
+const REQUIRED: [&str; 5] = [
     "nested parts (version 1.1 of the format): wavesplat 0.2 or later",
     "a description (version 1.1 of the format): wavesplat 0.2 or later",
     "tiers (version 1.2 of the format): wavesplat 0.2 or later",
     "listed values (version 1.2 of the format): wavesplat 0.2 or later",
+    "sides of values (version 1.2 of the format): wavesplat 0.2 or later",
 ];
 
 /// The bit of [`Packing::Nested`].
@@ -41,6 +42,9 @@ const TIERED: u64 = 4;
 /// The bit of listed values.
 const LISTED: u64 = 8;
 
+/// The bit of sides.
+const SIDED: u64 = 16;
+
 /// The required features of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Features {
@@ -52,6 +56,8 @@ pub struct Features {
     pub tiered: bool,
     /// Whether blocks may list their values.
     pub listed: bool,
+    /// Whether samples keep their sides of some values.
+    pub sided: bool,
 }
 
 impl Features {
@@ -78,14 +84,18 @@ impl Features {
     fn of_bits(required: u64) -> Self {
         let packing = if required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
         let has = |bit: u64| required & bit != 0;
-        Self { packing, described: has(DESCRIBED), tiered: has(TIERED), listed: has(LISTED) }
+        Self { packing, described: has(DESCRIBED), tiered: has(TIERED), listed: has(LISTED), sided: has(SIDED) }
     }
 
     /// The field `required` of the header.
     pub(crate) fn bits(self) -> u64 {
         let nested = if self.packing == Packing::Nested { NESTED } else { 0 };
         let bit = |has: bool, bit: u64| if has { bit } else { 0 };
-        nested | bit(self.described, DESCRIBED) | bit(self.tiered, TIERED) | bit(self.listed, LISTED)
+        nested
+            | bit(self.described, DESCRIBED)
+            | bit(self.tiered, TIERED)
+            | bit(self.listed, LISTED)
+            | bit(self.sided, SIDED)
     }
 }
 

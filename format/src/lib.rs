@@ -4,6 +4,7 @@
 //! no paths and maps no memory. It reads through [`Storage`] and writes to any `std::io::Write` without seeking.
 #![forbid(unsafe_code)]
 
+mod arithmetic;
 mod bits;
 mod block;
 mod bytes;
@@ -15,6 +16,7 @@ mod file_id;
 mod footer;
 mod geometry;
 mod header;
+mod keep;
 mod leaf;
 pub mod limits;
 mod listed;
@@ -29,6 +31,7 @@ mod recovery;
 mod sample;
 mod section;
 mod segments;
+mod sides;
 mod storage;
 mod structure;
 #[cfg(test)]
@@ -39,6 +42,7 @@ mod prefix;
 mod window;
 mod writer;
 
+pub use arithmetic::{BitDecoder, BitEncoder, Chance};
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 pub use codes::max_packed;
 pub use codes::sparse::{CodeBox, DenseCodes, Places, SparseCodes};
@@ -50,6 +54,7 @@ pub use error::{Error, Result};
 pub use file_id::FileId;
 pub use geometry::BlockGeometry;
 pub use header::Features;
+pub use keep::Keep;
 pub use leaf::LeafEntry;
 pub use listed::{Listed, unpack_listed};
 pub use metadata::{Bound, Metadata};
@@ -62,6 +67,7 @@ pub use pyramid::{Axis, Packing, Pass, PassBox, Pyramid, Stencil};
 pub use reader::Reader;
 pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
+pub use sides::{Side, SideCodes, SideSet, pack_sides, unpack_sides};
 pub use storage::Storage;
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

@@ -18,8 +18,11 @@ pub const MAX_LEVELS: usize = 32;
 /// Values of a block that lists them: a place in the list takes 16 bits.
 pub const MAX_LISTED: usize = 1 << 16;
 
-/// Parts of one block: every level, outliers, missing samples, exact samples.
-pub const MAX_PARTS: usize = MAX_LEVELS + 3;
+/// Values of which samples keep their sides.
+pub const MAX_SIDES: usize = 16;
+
+/// Parts of one block: every level, outliers, missing samples, exact samples, sides.
+pub const MAX_PARTS: usize = MAX_LEVELS + 4;
 
 /// Frames in one window: 1024, plus one for bases that need an odd number. A basis as a matrix stays near 8 MiB.
 pub const MAX_WINDOW_FRAMES: u32 = 1025;

@@ -3,6 +3,7 @@
 use crate::bytes::{FieldWriter, ParseResult, ensure, finite_amount};
 use crate::file_id::FileId;
 use crate::header::{Features, HEADER};
+use crate::keep::Keep;
 use crate::limits::*;
 use crate::pyramid::Packing;
 use crate::record::{decode_exact, encode};
@@ -141,12 +142,17 @@ impl Metadata {
         start
     }
 
+    /// What decoded samples keep.
+    pub fn keep(&self) -> Keep {
+        Keep::of_settings(&self.settings)
+    }
+
     /// The features that its windows have. Whether blocks list their values is not known from here.
     pub fn features(&self) -> Features {
         let nested = self.windows.iter().any(|window| window.packing() == Packing::Nested);
         let packing = if nested { Packing::Nested } else { Packing::Flat };
         let tiered = self.windows.iter().any(|window| window.tiers() > 0);
-        Features { packing, tiered, ..Features::default() }
+        Features { packing, tiered, sided: !self.keep().sides.is_empty(), ..Features::default() }
     }
 
     /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the

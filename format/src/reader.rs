@@ -16,6 +16,7 @@ use crate::listed::unpack_listed;
 use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::section::{FRAME, SectionId, decompress, read_checked, read_section};
+use crate::sides::{SideCodes, unpack_sides};
 use crate::{Error, Result, Storage};
 
 /// An open file. Every method takes `&self`; threads can share it if the storage is `Sync`.
@@ -290,6 +291,18 @@ impl<S: Storage> Reader<S> {
         unpacked(block, part, samples, |bytes| bytes.len() / geometry.sample_size).map(Some)
     }
 
+    /// Reads how samples of a block get to their sides of the values that the file [keeps](crate::Keep); `None` if all are there.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
+    pub fn sides(&self, block: &BlockEntry) -> Result<Option<Vec<SideCodes>>> {
+        self.check_present(block)?;
+        let Some(part) = block.part(PartKind::Sides) else { return Ok(None) };
+        let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
+        let sides = unpack_sides(&raw, geometry.samples());
+        unpacked(block, part, sides, |_| part.stats.count as usize).map(Some)
+    }
+
     /// Checks the checksum of every part of a block.
     ///
     /// # Errors
@@ -314,9 +327,9 @@ impl<S: Storage> Reader<S> {
 }
 
 /// Unpacks the payload of a part; returns the number of its items.
-fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> ParseResult<usize> {
+fn unpack(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> ParseResult<usize> {
     let (size, samples) = (geometry.sample_size, geometry.samples());
-    match kind {
+    match part.kind {
         PartKind::Level(level) => {
             let mut codes = vec![0; geometry.codes(level).unwrap_or(0)];
             unpack_level(geometry, level, raw, &mut codes)
@@ -325,6 +338,7 @@ fn unpack(geometry: &BlockGeometry<'_>, kind: PartKind, raw: &[u8]) -> ParseResu
         PartKind::Missing => unpack_missing(raw, size, samples).map(|(_, bytes)| bytes.len() / size),
         PartKind::Exact => unpack_exact(raw, size, samples).map(|bytes| bytes.len() / size),
         PartKind::Listed => unpack_listed(raw, size, geometry.extents()).map(|bytes| bytes.len() / size),
+        PartKind::Sides => unpack_sides(raw, samples).map(|_| part.stats.count as usize), // only decoding shows it
     }
 }
 
@@ -337,7 +351,7 @@ fn unpack_level(geometry: &BlockGeometry<'_>, level: u8, raw: &[u8], codes: &mut
 
 /// Checks that the payload of a part can be unpacked and holds as many items as the entry says.
 pub(crate) fn check_payload(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> ParseResult {
-    unpack(geometry, part.kind, raw).and_then(|held| check_count(held, part))
+    unpack(geometry, part, raw).and_then(|held| check_count(held, part))
 }
 
 fn check_count(held: usize, part: &PartEntry) -> ParseResult {

@@ -72,6 +72,7 @@ pub(crate) struct Content {
     pub(crate) outliers: Outliers,
     pub(crate) missing: Option<(Vec<bool>, Vec<u8>)>,
     pub(crate) exact: Option<Vec<u8>>,
+    pub(crate) sides: Option<Vec<SideCodes>>,
 }
 
 fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
@@ -94,8 +95,18 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
     } else if has_samples && random.below(2) == 0 {
         let positions: Vec<u32> = (0..total as u32).step_by(3).collect();
         found.outliers = Outliers { samples: bytes(positions.len()), positions };
+        let is_nested = geometry.window.packing() == Packing::Nested;
+        found.sides = is_nested.then(|| vec![SideCodes::default(), side_codes(&mut bytes(total))]);
     }
     found
+}
+
+/// Codes of one value with some bits.
+fn side_codes(bits: &mut Vec<u8>) -> SideCodes {
+    let mut sides = SideSet::default();
+    sides.insert(Side::Below);
+    sides.insert(Side::Above);
+    SideCodes { sides, reach: 0.5, bits: std::mem::take(bits) }
 }
 
 /// Codes of boxes, with zeros where they belong to another box.
@@ -162,6 +173,11 @@ pub(crate) fn encode(
         };
         part(kind, samples.len() / size, 0.0, 0.0, &raw);
     }
+    if let Some(sides) = &content.sides {
+        let mut raw = Vec::new();
+        pack_sides(sides, &mut raw);
+        part(PartKind::Sides, 1, 0.0, 0.0, &raw);
+    }
     let stats = BlockStats { step: 0.5, min: -1.0, max: 2.0, reached: 0.125, squared_error: 0.5, dropped: 0.25 };
     let stats = if id.tier > 0 { BlockStats { step: 0.5, ..BlockEntry::lost(id).stats } } else { stats };
     EncodedBlock { id, stats, parts }
@@ -184,6 +200,9 @@ pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, C
         }
     }
     count(metadata, &found);
+    if found.iter().any(|(_, content)| content.sides.is_some()) {
+        metadata.settings.push((Keep::SETTING.into(), "side=-3,0.5".into()));
+    }
     found
 }
 
@@ -196,7 +215,7 @@ pub(crate) fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)])
                 PartKind::Level(_) => window.coded += part.stats.count,
                 PartKind::Outliers => window.outliers += part.stats.count,
                 PartKind::Missing => window.missing += part.stats.count,
-                PartKind::Exact | PartKind::Listed => {}
+                PartKind::Exact | PartKind::Listed | PartKind::Sides => {}
             }
         }
     }
@@ -273,5 +292,5 @@ fn read_content<S: Storage>(reader: &Reader<S>, block: &BlockEntry) -> Result<Co
     };
     let levels = (0..reader.geometry(block.id)?.window.parts() as u8).map(level).collect::<Result<_>>()?;
     let (outliers, missing, exact) = (reader.outliers(block)?, reader.missing(block)?, reader.exact(block)?);
-    Ok(Content { levels, outliers, missing, exact })
+    Ok(Content { levels, outliers, missing, exact, sides: reader.sides(block)? })
 }

@@ -188,7 +188,7 @@ fn long_windows_learn_functions_only_where_these_take_few_bytes() {
 }
 
 #[test]
-fn negative_decoded_samples_are_warned_of_and_clipped() {
+fn negative_decoded_samples_are_warned_of_and_kept_in_the_range() {
     let work = Work::new();
     let archive = changed(|_, v| (v - 0.5).max(0.0));
     let (least, most) = archive.values.iter().fold((f32::MAX, f32::MIN), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
@@ -197,15 +197,17 @@ fn negative_decoded_samples_are_warned_of_and_clipped() {
     let said = |run: &Run| warnings(run).contains("no sample is negative");
     let run = work.wavesplat("convert a.npy -o a.wspl").ok();
     let remedy = run.err.split_once("no sample is negative, but some decoded samples are as low as -0.0");
-    assert!(said(&run) && remedy.is_some_and(|(_, remedy)| remedy.contains("; --clip ")), "{}", run.err);
-    for options in ["--clip", "--clip --max-error 0.02", "--clip --bound rms", "--clip --basis haar --window 8"] {
-        assert!(!said(&work.wavesplat(&format!("convert a.npy -o b.wspl --force {options}")).ok()), "{options}");
+    assert!(said(&run) && remedy.is_some_and(|(_, remedy)| remedy.contains("; --keep range ")), "{}", run.err);
+    for options in
+        ["range", "sign --keep range", "range --max-error 0.02", "range --bound rms", "range --basis haar --window 8"]
+    {
+        assert!(!said(&work.wavesplat(&format!("convert a.npy -o b.wspl --force --keep {options}")).ok()), "{options}");
         work.wavesplat("extract b.wspl -o b.npy --force").ok();
         let back = floats(&read_npy(&work.read("b.npy")).1);
         assert!(back.iter().all(|v| (0.0..=most).contains(v)), "{options}");
         work.wavesplat("verify b.wspl --against a.npy").ok();
         let made = work.wavesplat("info b.wspl").ok();
-        assert!(made.text().contains("--clip=true"), "{}", made.text());
+        assert!(made.text().contains("keeps      range"), "{}", made.text());
     }
     work.wavesplat("extract a.wspl -o a2.npy").ok();
     assert!(floats(&read_npy(&work.read("a2.npy")).1).iter().any(|v| *v < 0.0));

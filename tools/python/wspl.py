@@ -32,8 +32,9 @@ BLOCKS_PER_LEAF = 512
 MAX_BLOCK_SAMPLES = 8388608
 MAX_PART_RAW = 100663296
 MAX_LISTED = 65536
+MAX_SIDES = 16
 MAX_LEVELS = 32
-MAX_PARTS = 35
+MAX_PARTS = 36
 MAX_WINDOW_FRAMES = 1025
 MAX_COEFFICIENTS = 4100
 MAX_DIM = 2147483648
@@ -87,7 +88,7 @@ LEAF = Layout(
 )
 
 # Kinds of parts and sections (section 4).
-LEVEL, OUTLIERS, MISSING, EXACT = 0, 1, 2, 3
+LEVEL, OUTLIERS, MISSING, EXACT, SIDES = 0, 1, 2, 3, 4
 KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21, b"WEND": 22, b"DESC": 23}
 
 # The totals of no blocks: reached, share, squared_error, min, max, then counts.
@@ -308,6 +309,21 @@ class Metadata:
     program: str
     start: bytes  # the record of the start: this one without frames, times and windows
 
+    @property
+    def kept(self) -> list[str]:
+        """The words of the setting `keep`."""
+        return [word for name, words in self.settings if name == "keep" for word in words.split()]
+
+    @property
+    def keeps_range(self) -> bool:
+        return "range" in self.kept or ("clip", "true") in self.settings
+
+    @property
+    def sides(self) -> list[float]:
+        """The values of which samples keep their sides."""
+        named = [float(value) for word in self.kept if word.startswith("side=") for value in word[5:].split(",")]
+        return sorted({value + 0.0 for value in named} | ({0.0} if "sign" in self.kept else set()))
+
     @staticmethod
     def read(data: bytes) -> "Metadata":
         r = Record(data, "metadata")
@@ -491,8 +507,8 @@ def plain_sum(values) -> float:
     return total
 
 
-def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, listed: bool) -> None:
-    """Sections 5 and 9: an entry by itself and with the block's geometry. `listed`: blocks may list their values."""
+def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, listed: bool, sided: bool) -> None:
+    """Sections 5 and 9: an entry by itself and with the block's geometry. `listed`: blocks may list their values; `sided`: have sides."""
     place = b.place
     need(b.lost <= 1, place, "lost is neither 0 nor 1")
     need(finite(b.step, b.reached) and b.reached >= 0, place, "step or error is not finite")
@@ -512,13 +528,14 @@ def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, l
     need(not b.exact or all(p.kind in (MISSING, EXACT) for p in b.parts), place, "exact beside levels or outliers")
     need(sum(p.kind == EXACT for p in b.parts) <= 1, place, "two exact parts")
     need(listed or (EXACT, 1) not in keys, place, "listed values are not announced")
+    need(sided or (SIDES, 0) not in keys, place, "sides are not announced")
     for p in b.parts:
         check_part(p, w, b.tier, size, sample_bytes, f"{place}, part of kind {p.kind}, level {p.level}")
 
 
 def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: str) -> None:
     need(p.reserved == p.reserved_too == 0, place, "reserved bytes are not zero")
-    need(p.kind <= EXACT, place, "there is no such kind")
+    need(p.kind <= SIDES, place, "there is no such kind")
     need(p.level < {LEVEL: w.level_parts, EXACT: 2}.get(p.kind, 1), place, "there is no such level")
     need(p.count >= 1, place, "count is 0")
     need(p.energy >= 0 and finite(p.largest) and p.largest >= 0, place, "bad energy or largest amount")
@@ -537,6 +554,9 @@ def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: st
         fits = p.raw == (4 + s) * p.count
     elif p.kind == MISSING:
         fits = p.raw == -(-samples // 8) + s * p.count
+    elif p.kind == SIDES:
+        most = MAX_SIDES * samples
+        fits = p.raw <= MAX_SIDES * (13 + 3 * samples + 8)
     elif p.level == 1:
         cells = math.prod(cells_of((*size, w.frames)))
         longest = 8 + s * min(MAX_LISTED, samples) + lattice_most(cells, samples)
@@ -617,6 +637,101 @@ def read_listed(data: bytes, dtype: np.dtype, extents: tuple[int, ...], place: s
     places = places + base
     need(places.min() >= 0 and places.max() < n, place, "a place is not in the list")
     return values.view(dtype)[places].reshape(-1)
+
+
+def read_sides(data: bytes, samples: int, place: str) -> list[tuple[int, float, bytes]]:
+    """For each value: the sides of the source's samples, the reach, and the bits."""
+    r, found = Record(data, place), []
+    while r.at < len(data):
+        sides = r.get("B")
+        need(sides < 8, place, "there is no such side")
+        if sides:
+            reach, n = r.get("dI")
+            need(finite(reach) and reach >= 0, place, "bad reach")
+            need(n <= 3 * samples + 8, place, "too many bits")
+            found.append((sides, reach, r.take(n)))
+        else:
+            found.append((0, 0.0, b""))
+    need(1 <= len(found) <= MAX_SIDES, place, "too few or too many values")
+    return found
+
+
+class Coder:
+    """Reads bits that were coded arithmetically, each of a kind."""
+
+    def __init__(self, data: bytes):
+        self.data, self.at, self.range, self.code, self.chances = data, 4, 2**32 - 1, 0, {}
+        self.code = int.from_bytes(data[:4].ljust(4, b"\0"), "big")
+
+    def take(self, kind) -> int:
+        chance, shift = self.chances.get(kind, (32768, 1))
+        bound = (self.range >> 16) * chance
+        if bit := int(self.code >= bound):
+            self.code, self.range = self.code - bound, self.range - bound
+            chance -= chance >> shift
+        else:
+            self.range = bound
+            chance += (65536 - chance) >> shift
+        self.chances[kind] = chance, min(shift + 1, 6)
+        while self.range < 1 << 24:
+            byte = self.data[self.at] if self.at < len(self.data) else 0
+            self.range, self.code, self.at = self.range << 8, self.code << 8 | byte, self.at + 1
+        return bit
+
+
+def nearest_samples(dtype: np.dtype, value: float, missing: float | None) -> list:
+    """The samples below, at and above a value that are nearest to it; None where there are none."""
+
+    def step(sample, up: bool):
+        if dtype.kind == "f":
+            return np.nextafter(sample, dtype.type(math.inf if up else -math.inf))
+        limits, one = np.iinfo(dtype), 1 if up else -1
+        return sample + one if limits.min <= sample + one <= limits.max else None
+
+    def beside(up: bool):
+        if dtype.kind == "f":
+            with np.errstate(all="ignore"):
+                sample = dtype.type(value)
+            first = sample if (float(sample) > value if up else float(sample) < value) else step(sample, up)
+        else:
+            limits = np.iinfo(dtype)
+            first = max(math.floor(value) + 1, limits.min) if up else min(math.ceil(value) - 1, limits.max)
+            first = first if limits.min <= first <= limits.max else None
+        if first is not None and missing is not None and float(first) == missing:
+            first = step(first, up)
+        return first
+
+    with np.errstate(all="ignore"):
+        is_sample = float(dtype.type(value)) == value if dtype.kind == "f" else value == int(value)
+    return [beside(False), value if is_sample else None, beside(True)]
+
+
+def put_on_sides(out: np.ndarray, value: float, code, size: tuple[int, ...], fixed: np.ndarray, missing) -> np.ndarray:
+    """Moves samples to their sides of a value. `out` and `fixed` are [frame * voxels + voxel]."""
+    sides, reach, bits = code
+    if not sides:
+        return out
+    out, coder, nearest = out.copy(), Coder(bits), nearest_samples(out.dtype, value, missing)
+    (nx, ny, nz), voxels = size, math.prod(size)
+    with np.errstate(all="ignore"):
+        numbers = out.astype(np.float64)
+        distances = np.abs(numbers - value)
+        relative = np.nan_to_num(distances / np.float64(reach), nan=0.0, posinf=0.0)
+    for i in np.flatnonzero((distances <= reach) & ~fixed):
+        side = 0 if numbers[i] < value else 2 if numbers[i] > value else 1
+        others = [other for other in range(3) if other != side and sides >> other & 1]
+        if not others:
+            continue
+        steps = (1, i % nx), (nx, i // nx % ny), (nx * ny, i // (nx * ny) % nz), (voxels, i // voxels)
+        above = sum(bool(at and numbers[i - step] > value) for step, at in steps)
+        kind = side, min(15, math.floor(16 * math.sqrt(relative[i]))), above
+        if sides >> side & 1 and not coder.take(kind):
+            continue
+        to = others[1] if len(others) == 2 and coder.take(side) else others[0]
+        if nearest[to] is not None:
+            out[i] = nearest[to]
+            numbers[i] = out[i]
+    return out
 
 
 # ---------------------------------------------------------------- lattice codes (section 7)
@@ -1213,13 +1328,13 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
         if head.major != 1:
             raise Unsupported("header", f"version {head.major}", 8)
-        if head.required > 15:
+        if head.required > 31:
             words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
             raise Unsupported("header", f"the file needs: {words}", 16)
         need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
         self.id = head.id
-        features = [bool(head.required & bit) for bit in (1, 2, 4, 8)]
-        self.nested, self.described, self.tiered, self.listed = features
+        features = [bool(head.required & bit) for bit in (1, 2, 4, 8, 16)]
+        self.nested, self.described, self.tiered, self.listed, self.sided = features
 
     def _footer(self) -> None:
         """Checks the footer and the places of metadata and root."""
@@ -1338,7 +1453,7 @@ class Archive:
         for i, b in enumerate(blocks):
             key = (leaf.window, leaf.first_block + i, leaf.channel, leaf.tier)
             need(b.where == key, place, "blocks are not in order")
-            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize, self.listed)
+            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize, self.listed, self.sided)
             part_at = at + FRAME.size + len(b.bytes)
             for p in b.parts:
                 need(p.offset == part_at, b.place, f"a part does not begin at byte {part_at}", p.offset)
@@ -1392,14 +1507,22 @@ class Archive:
                 c = self._coefficients(b, w, size, payloads)
                 need(np.isfinite(c).all(), b.place, "a coefficient is not finite")
                 out = to_samples(inverse(c, w), dtype, b.place).reshape(-1)
-                if ("clip", "true") in self.metadata.settings and w.min <= w.max:
+                if self.metadata.keeps_range and w.min <= w.max:
                     out = np.clip(out, dtype.type(w.min), dtype.type(w.max))
+        fixed = np.zeros(count, bool)
         for kind, read in ((OUTLIERS, read_outliers), (MISSING, read_missing)):
             if (kind, 0) in payloads:
                 p, data = payloads[kind, 0]
                 which, values = read(data, dtype, p.count, count, f"{b.place}, part of kind {kind}")
                 out = out.copy()
                 out[which] = values
+                fixed[which] = True
+        if (SIDES, 0) in payloads:
+            place = f"{b.place}, part of kind {SIDES}"
+            codes = read_sides(payloads[SIDES, 0][1], count, place)
+            need(len(codes) == len(self.metadata.sides), place, "other values than the file keeps")
+            for value, code in zip(self.metadata.sides, codes):
+                out = put_on_sides(out, value, code, size, fixed, self.metadata.missing_value)
         return out.reshape(w.frames, *size[::-1])
 
     def _coefficients(self, b: Block, w: Window, size: tuple[int, ...], payloads: dict) -> np.ndarray:

@@ -32,6 +32,21 @@ impl Half {
         self.0.to_le_bytes()
     }
 
+    /// The next larger half.
+    pub(crate) fn next_up(self) -> Self {
+        match self.0 {
+            0x8000 => Self(1), // -0
+            bits if bits & 0x8000 == 0 => Self(if u64::from(bits) < INFINITY { bits + 1 } else { bits }),
+            bits => Self(bits - 1),
+        }
+    }
+
+    /// The next smaller half.
+    pub(crate) fn next_down(self) -> Self {
+        let Self(up) = Self(self.0 ^ 0x8000).next_up();
+        Self(up ^ 0x8000)
+    }
+
     /// The nearest half, ties to even; beyond the largest, infinity.
     pub(crate) fn nearest(value: f64) -> Self {
         let sign = (value.to_bits() >> 48) as u16 & 0x8000;

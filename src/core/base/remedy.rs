@@ -45,8 +45,8 @@ pub enum Remedy {
     DeclareMissingOrError(String),
     /// Set this field to a value.
     Try(&'static str, String),
-    /// Set `clip`, which keeps extracted samples within the extremes of the source.
-    Clip,
+    /// Keep `range`: extracted samples stay within the extremes of the source.
+    KeepRange,
     /// Allow larger errors by this field.
     Allow(&'static str),
     /// Build with this Cargo feature.

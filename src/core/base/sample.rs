@@ -105,6 +105,40 @@ pub fn round_to(ty: SampleType, value: f64) -> f64 {
     }
 }
 
+/// The sample of type `ty` next to a finite value: the least above it (`up`), or the largest below; infinite beyond the largest float,
+/// none beyond the range of integers.
+pub fn beside(ty: SampleType, value: f64, up: bool) -> Option<f64> {
+    macro_rules! float {
+        ($nearest:expr, $up:expr, $down:expr) => {{
+            let nearest = $nearest;
+            let is_beyond = if up { f64::from(nearest) > value } else { f64::from(nearest) < value };
+            Some(f64::from(match is_beyond {
+                true => nearest,
+                false if up => $up(nearest),
+                false => $down(nearest),
+            }))
+        }};
+    }
+    macro_rules! integer {
+        ($t:ty) => {{
+            let next = if up { value.floor() + 1.0 } else { value.ceil() - 1.0 };
+            let (least, most) = (f64::from(<$t>::MIN), f64::from(<$t>::MAX));
+            if up { Some(next.max(least)).filter(|n| *n <= most) } else { Some(next.min(most)).filter(|n| *n >= least) }
+        }};
+    }
+    match ty {
+        SampleType::U8 => integer!(u8),
+        SampleType::I8 => integer!(i8),
+        SampleType::U16 => integer!(u16),
+        SampleType::I16 => integer!(i16),
+        SampleType::U32 => integer!(u32),
+        SampleType::I32 => integer!(i32),
+        SampleType::F16 => float!(Half::nearest(value), Half::next_up, Half::next_down),
+        SampleType::F32 => float!(value as f32, f32::next_up, f32::next_down),
+        SampleType::F64 => float!(value, f64::next_up, f64::next_down),
+    }
+}
+
 /// Writes `values` as little-endian samples of type `ty`, rounded as by [`round_to`].
 pub fn store(ty: SampleType, values: &[f64], out: &mut [u8]) {
     dispatch!(to_bytes(ty, values, out));
@@ -136,6 +170,20 @@ fn to_bytes(ty: SampleType, values: &[f64], out: &mut [u8]) {
     }
     for_type!(ty, run, values, out);
 }
+
+/// Replaces samples below `lo` by it, and those above `hi` by that.
+pub fn clip(ty: SampleType, lo: f64, hi: f64, samples: &mut [u8]) {
+    let mut values = vec![0.0; CLIPPED];
+    for run in samples.chunks_mut(CLIPPED * ty.size()) {
+        let values = &mut values[..run.len() / ty.size()];
+        load(ty, run, values);
+        values.iter_mut().for_each(|value| *value = value.clamp(lo, hi));
+        store(ty, values, run);
+    }
+}
+
+/// Samples that are clipped at a time.
+const CLIPPED: usize = 4 << 10;
 
 /// Whether a sample is missing: not finite, or equal to the `declared` missing value.
 pub fn is_missing(value: f64, declared: Option<f64>) -> bool {

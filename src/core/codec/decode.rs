@@ -9,11 +9,14 @@ use super::buffer::Buffer;
 use super::codes::Codes;
 use super::field::{Above, Field, LONG_RUN, Plane, RUN, Stored};
 use super::rows::Change;
+use super::sides::{Fixed, Walk};
 use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
 use std::ops::Range;
-use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, Storage};
+use wavesplat_format::{
+    Axis, Basis, BlockEntry, Error, Outliers, PartEntry, PartKind, Reader, Result, Side, SideCodes, Storage,
+};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -36,6 +39,8 @@ pub struct Block {
     pub missing: (Vec<bool>, Vec<u8>),
     /// All samples, if the block is stored exactly.
     pub exact: Option<Vec<u8>>,
+    /// How samples get to their sides of each value that the file keeps; empty if all are there.
+    pub sides: Vec<SideCodes>,
     /// The number of stored bytes read.
     pub bytes_read: u64,
 }
@@ -84,6 +89,7 @@ impl Block {
             outliers: reader.outliers(entry)?,
             missing: reader.missing(entry)?.unwrap_or_default(),
             exact: reader.exact(entry)?,
+            sides: read_sides(reader, codec, entry)?,
             bytes_read: 0,
         };
         block.thin_samples(codec);
@@ -98,8 +104,11 @@ impl Block {
         entry: &'a BlockEntry,
         wanted: &'a [bool],
     ) -> impl Iterator<Item = &'a PartEntry> {
-        entry.parts.iter().filter(|part| match part.kind {
+        let decodes_sides = codec.decodes_sides(entry);
+        entry.parts.iter().filter(move |part| match part.kind {
+            PartKind::Level(_) if decodes_sides => true,
             PartKind::Level(level) => codec.needs_part(level.into(), wanted),
+            PartKind::Sides => decodes_sides,
             _ => true,
         })
     }
@@ -130,6 +139,7 @@ impl Block {
             outliers,
             missing,
             exact: None,
+            sides: Vec::new(),
             bytes_read: 0,
         }
     }
@@ -279,7 +289,8 @@ impl Block {
         let overrides = self.missing.0.len() + self.missing.1.len() + self.outliers.samples.len();
         let exact = self.exact.as_ref().map_or(0, Vec::len);
         let above = self.above.as_ref().map_or(0, Above::held_bytes);
-        above + self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact
+        let sides: usize = self.sides.iter().map(|codes| codes.bits.len() + size_of::<SideCodes>()).sum();
+        above + self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact + sides
     }
 
     /// Whether all coefficients are zero.
@@ -377,6 +388,9 @@ impl Block {
 
     /// As [`Self::samples`]; only some frames have their samples.
     pub fn samples_of(&self, codec: &WindowCodec, wanted: &WantedFrames) -> Buffer<u8> {
+        if !self.sides.is_empty() {
+            return self.decode(codec, &WantedFrames::all(codec), |_, _| {}); // sides depend on the samples before
+        }
         if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
             let field = self.field_of(codec, wanted);
             if field.is_single() {
@@ -415,6 +429,12 @@ impl Block {
         for (index, bytes) in self.outliers.positions.iter().map(|p| *p as usize).zip(outliers) {
             sample::load(codec.sample, bytes, &mut values[index..=index]);
         }
+        if self.keeps_sides(codec) {
+            let mut rounded = vec![0.0; values.len()];
+            sample::load(codec.sample, &samples, &mut rounded);
+            let moved = values.iter_mut().zip(rounded).filter(|(value, sample)| is_beside(codec, **value, *sample));
+            moved.for_each(|(value, sample)| *value = sample);
+        }
         (samples, values)
     }
 
@@ -433,14 +453,52 @@ impl Block {
             }
         }
         self.put_overrides(size, &mut out);
+        self.put_on_sides(codec, &mut out);
         out
+    }
+
+    /// Whether samples keep their sides of some values: not where detail is left out, and exact samples have them anyway.
+    pub fn keeps_sides(&self, codec: &WindowCodec) -> bool {
+        !codec.sides.is_empty() && codec.lod == 0 && self.exact.is_none()
+    }
+
+    /// The samples of some frames that are on another side of a kept value than what their coefficients give, by index. Those stored
+    /// exactly or missing are left out. `field` has the coefficients that the frames need.
+    pub fn moved(&self, codec: &WindowCodec, field: &Field<'_>, wanted: &WantedFrames) -> Vec<(usize, f64)> {
+        if !self.keeps_sides(codec) {
+            return Vec::new();
+        }
+        let (samples, size, mut moved, mut run) = (self.samples(codec), codec.sample.size(), Vec::new(), Vec::new());
+        self.for_each_run_of(codec, field, wanted, |first, values| {
+            run.resize(values.len(), 0.0);
+            sample::load(codec.sample, &samples[first * size..][..values.len() * size], &mut run);
+            let pairs = (first..).zip(values.iter().zip(&run));
+            let beside = pairs.filter(|(_, (value, sample))| is_beside(codec, **value, **sample));
+            moved.extend(
+                beside.filter(|(index, _)| !self.is_fixed(*index)).map(|(index, (_, sample))| (index, *sample)),
+            );
+        });
+        moved
+    }
+
+    /// Whether a sample is stored exactly or missing.
+    fn is_fixed(&self, index: usize) -> bool {
+        self.is_missing(index) || self.outliers.positions.binary_search(&(index as u32)).is_ok()
+    }
+
+    /// Moves samples to their sides of the kept values.
+    fn put_on_sides(&self, codec: &WindowCodec, samples: &mut [u8]) {
+        let fixed = Fixed { exact: &self.outliers.positions, missing: &self.missing.0 };
+        for (value, codes) in codec.sides.iter().zip(&self.sides) {
+            Walk::new(codec, self.size, *value, fixed).apply(codes, samples);
+        }
     }
 
     /// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
     fn clip(&self, codec: &WindowCodec, frames: &[usize], samples: &mut [u8]) {
         let Some((lo, hi)) = codec.clip else { return };
         let each = self.voxels * codec.sample.size();
-        frames.iter().for_each(|frame| clip(codec.sample, lo, hi, &mut samples[frame * each..][..each]));
+        frames.iter().for_each(|frame| sample::clip(codec.sample, lo, hi, &mut samples[frame * each..][..each]));
     }
 
     /// Replaces samples by outliers and missing samples.
@@ -454,19 +512,23 @@ impl Block {
     }
 }
 
-/// Replaces samples below `lo` by it, and those above `hi` by that.
-pub(super) fn clip(ty: SampleType, lo: f64, hi: f64, samples: &mut [u8]) {
-    let mut values = vec![0.0; CLIPPED];
-    for run in samples.chunks_mut(CLIPPED * ty.size()) {
-        let values = &mut values[..run.len() / ty.size()];
-        sample::load(ty, run, values);
-        values.iter_mut().for_each(|value| *value = value.clamp(lo, hi));
-        sample::store(ty, values, run);
-    }
+/// Whether two numbers are on different sides of a kept value.
+fn is_beside(codec: &WindowCodec, a: f64, b: f64) -> bool {
+    codec.sides.iter().any(|side| Side::of(a, *side) != Side::of(b, *side))
 }
 
-/// Samples that are clipped at a time.
-const CLIPPED: usize = 4 << 10;
+/// Reads how samples get to their sides, if they are decoded with all detail.
+fn read_sides<S: Storage>(reader: &Reader<S>, codec: &WindowCodec, entry: &BlockEntry) -> Result<Vec<SideCodes>> {
+    if !codec.decodes_sides(entry) {
+        return Ok(Vec::new());
+    }
+    let sides = reader.sides(entry)?.unwrap_or_default();
+    if sides.len() == codec.sides.len() {
+        return Ok(sides);
+    }
+    let (has, keeps) = (sides.len(), codec.sides.len());
+    Err(Error::Invalid(format!("{}: sides of {has} values, but the file keeps those of {keeps}", entry.id)))
+}
 
 fn is_level(part: &PartEntry) -> bool {
     matches!(part.kind, PartKind::Level(_))

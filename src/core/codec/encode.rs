@@ -23,12 +23,14 @@ use super::listed::may_be_smaller;
 use super::load::{Missing, Source, load_group};
 use super::refine::Coded;
 use super::rows::count_nonzero;
+use super::sides::CodedSides;
 use super::truncate::Truncation;
 use super::{WindowCodec, lane_groups};
+use crate::base::sample::join_ranges;
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Listed, PartKind, PartStats};
-use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers};
+use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers, pack_sides};
 
 /// The encoder of one worker.
 #[derive(Debug)]
@@ -72,27 +74,38 @@ impl Encoder {
         let samples = &BoxSamples::new(codec.sample, &extended, around, size);
         let missing = Missing::within(codec, samples, &missing_around);
         let block = Source { codec, samples: *samples, missing: &missing };
+        let (mut single, mut double) = (Buffer::default(), Buffer::default());
         let coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
-                let (known, field) = (above.map(Above::singles), &mut Buffer::default());
-                block.refine(pyramid, size, &outer, known, field, &mut self.codes)
+                block.refine(pyramid, size, &outer, above.map(Above::singles), &mut single, &mut self.codes)
             }
             Some(pyramid) => {
-                let (known, field) = (above.map(Above::doubles), &mut Buffer::default());
-                block.refine(pyramid, size, &outer, known, field, &mut self.codes)
+                block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut double, &mut self.codes)
             }
         };
-        let coded = match coded {
-            Some(coded) => self.coded_parts(codec, size, &coded)?,
+        let parts = match &coded {
+            Some(coded) => self.coded_parts(codec, size, coded)?,
             None => self.exact_parts(codec, samples, &missing, None)?,
         };
-        let Parts { stats, share, mut parts } = self.smaller(codec, samples, &missing, coded)?;
+        let mut parts = self.smaller(codec, samples, &missing, parts)?;
+        if let Some(coded) = coded.filter(|_| !codec.sides.is_empty() && !parts.are_exact()) {
+            let field = match &codec.scheme.pyramid {
+                _ if coded.step == 0.0 => Field::zero(codec),
+                None => Field::scaled(codec, coded.step, &self.codes),
+                Some(pyramid) if pyramid.single => Field::single(single, coded.marked),
+                Some(_) => Field::double(double, coded.marked),
+            };
+            if let Some(sides) = block.sides(parts.stats.reached, &coded.outliers, &field) {
+                parts.add_sides(&mut self.compressor, &sides, clear(&mut self.raw))?;
+            }
+        }
+        let Parts { stats, share, mut parts } = parts;
         if missing.count > 0 {
             pack_missing(missing.mask(), &missing.samples(samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
-            parts.sort_by_key(|part| part.kind); // exact parts come after it
+            parts.sort_by_key(|part| part.kind); // exact parts and sides come after it
         }
         Ok(Encoded { block: EncodedBlock { id, stats, parts }, share })
     }
@@ -296,6 +309,26 @@ impl Parts {
     /// Bytes of the file that they take, without entries.
     fn bytes(&self) -> usize {
         self.parts.iter().map(|part| part.stored.len()).sum()
+    }
+
+    /// Whether all samples are stored exactly.
+    fn are_exact(&self) -> bool {
+        self.parts.iter().any(|part| part.kind.is_exact())
+    }
+
+    /// Adds how samples get to their sides.
+    fn add_sides(
+        &mut self,
+        compressor: &mut Compressor,
+        sides: &CodedSides,
+        raw: &mut Vec<u8>,
+    ) -> wavesplat_format::Result<()> {
+        pack_sides(&sides.codes, raw);
+        let stats = PartStats { count: sides.count, energy: 0.0, largest: 0.0 };
+        self.parts.push(compressor.part(PartKind::Sides, stats, raw)?);
+        let range = join_ranges((self.stats.min, self.stats.max), sides.range);
+        (self.stats.min, self.stats.max) = range;
+        Ok(())
     }
 
     /// These, or others that take less.

@@ -167,6 +167,11 @@ impl Field<'static> {
         Self { values: Values::Single(nodes), marked }
     }
 
+    /// Coefficients that are all zero.
+    pub(super) fn zero(codec: &WindowCodec) -> Self {
+        Self { values: Values::Zero, marked: vec![false; codec.basis.coefficients()] }
+    }
+
     /// As [`Self::single`], in 64-bit floats.
     pub(super) fn double(nodes: Buffer<f64>, marked: Vec<bool>) -> Self {
         Self { values: Values::Double(nodes), marked }
@@ -202,6 +207,11 @@ impl Field<'_> {
 }
 
 impl<'a> Field<'a> {
+    /// Codes times a step.
+    pub(super) fn scaled(codec: &WindowCodec, step: f64, codes: &'a [i32]) -> Self {
+        Self { values: Values::Codes { step, codes }, marked: vec![true; codec.basis.coefficients()] }
+    }
+
     /// Decodes all codes of a block. Without codes, all coefficients are zero.
     pub(super) fn decode(codec: &WindowCodec, of: Stored<'a>) -> Self {
         let all = vec![true; codec.basis.coefficients()];

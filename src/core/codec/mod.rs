@@ -30,6 +30,7 @@ mod rows;
 pub mod block_with_ghosts;
 pub mod scheme;
 mod screen;
+mod sides;
 pub mod trial;
 mod truncate;
 
@@ -44,7 +45,7 @@ use real::Real;
 use scheme::Scheme;
 use std::ops::Range;
 use std::sync::Arc;
-use wavesplat_format::{Axis, Metadata, Packing, Pyramid, Window};
+use wavesplat_format::{Axis, BlockEntry, Metadata, Packing, PartKind, Pyramid, Window};
 
 /// Returns the memory of all unused buffers and codes to the system.
 pub fn release_spare() {
@@ -91,6 +92,8 @@ pub struct WindowCodec {
     pub missing_value: Option<f64>,
     /// If set, extracted samples are clamped to this range, the range of the source's samples in the window.
     pub clip: Option<(f64, f64)>,
+    /// The values of which samples keep their sides.
+    pub sides: Arc<[f64]>,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
     /// Whether blocks may list their values.
@@ -130,6 +133,7 @@ impl WindowCodec {
             bound,
             missing_value: None,
             clip: None,
+            sides: Arc::from([]),
             levels,
             lists: false,
             lod: 0,
@@ -149,8 +153,9 @@ impl WindowCodec {
         let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
         let bound = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
         let codec = Self::with_levels(scheme, basis, file.sample, bound, &levels);
-        let clip = Some((window.min, window.max)).filter(|(lo, hi)| lo <= hi && is_clipped(file));
-        Ok(Self { missing_value: file.missing_value, clip, ..codec })
+        let keep = file.keep();
+        let clip = Some((window.min, window.max)).filter(|(lo, hi)| lo <= hi && keep.range);
+        Ok(Self { missing_value: file.missing_value, clip, sides: keep.sides.into(), ..codec })
     }
 
     /// The largest number of level parts of a block.
@@ -197,6 +202,11 @@ impl WindowCodec {
             Some(pyramid) if !self.is_all_above() => self.passes(pyramid, size).within(part).needed_above(),
             _ => *part,
         }
+    }
+
+    /// Whether decoding a block moves samples to their sides of kept values, which takes all its coefficients.
+    pub fn decodes_sides(&self, entry: &BlockEntry) -> bool {
+        self.lod == 0 && entry.part(PartKind::Sides).is_some()
     }
 
     /// The codec of a tier's blocks at a level of detail of their lattice.
@@ -249,14 +259,6 @@ impl WindowCodec {
         let lost = a.is_nan() || b.is_nan() || self.is_missing(extracted);
         if lost { f64::INFINITY } else { a.max(b) }
     }
-}
-
-/// The setting that marks files whose extracted samples are clamped to the range of the source.
-pub const CLIP: (&str, &str) = ("clip", "true");
-
-/// Whether extracted samples are clamped to the range of the source.
-fn is_clipped(file: &Metadata) -> bool {
-    file.settings.iter().any(|(name, value)| (name.as_str(), value.as_str()) == CLIP)
 }
 
 /// The last level part that a level of detail needs.

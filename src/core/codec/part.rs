@@ -1,7 +1,7 @@
 //! The samples of a part of a block, decoded from its coefficients without those of the other voxels.
 
 use super::WindowCodec;
-use super::decode::{Block, clip};
+use super::decode::Block;
 use super::field::{Field, RUN};
 use crate::base::grid::Region;
 use crate::base::sample;
@@ -34,7 +34,7 @@ impl Block {
             }
         });
         if let Some((lo, hi)) = codec.clip {
-            clip(codec.sample, lo, hi, &mut out);
+            sample::clip(codec.sample, lo, hi, &mut out);
         }
         for (at, bytes) in self.outliers.positions.iter().zip(self.outliers.samples.chunks_exact(size)) {
             if let Some(to) = self.place(*at as usize, frames, part) {

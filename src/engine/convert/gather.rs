@@ -115,6 +115,7 @@ impl<'a> WindowReader<'a> {
             described: archive.description.is_some(),
             tiered: plan.tiers > 0,
             listed: config.lists(),
+            sided: !config.keep.sides.is_empty(),
         });
         let (id, range, scheme) = (done.id, None, None);
         Self {
@@ -246,7 +247,8 @@ impl<'a> WindowReader<'a> {
         };
         let mut codec = selector.choose()?;
         self.scheme = Some(Scheme::clone(&codec.scheme));
-        codec.clip = Some(of_window).filter(|(lo, hi)| config.clip && lo <= hi);
+        codec.clip = Some(of_window).filter(|(lo, hi)| config.keep.range && lo <= hi);
+        codec.sides = config.keep.sides.as_slice().into();
         self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
         let id = self.id(scan.digest)?;
         let index =

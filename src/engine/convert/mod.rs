@@ -67,7 +67,7 @@ use wavesplat_core::codec::{self, WindowCodec};
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{Archive, FrameSource};
 pub use wavesplat_format::{Basis, Packing, Stencil};
-use wavesplat_format::{CompletePrefix, Features, FileId, Window};
+use wavesplat_format::{CompletePrefix, Features, FileId, Keep, Window};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -118,8 +118,8 @@ pub struct ConvertConfig {
     /// Refuse a window if its largest or smallest value repeats, probably means "missing", and would make a bound that
     /// refers to the value range larger than the variation of the other samples. Default: true.
     pub refuse_fill: bool,
-    /// Clamp extracted samples to the smallest and largest source sample of their window. Default: no.
-    pub clip: bool,
+    /// What samples keep besides the bound. Default: nothing.
+    pub keep: Keep,
     /// Colours to convert samples to before they are coded: three channels, 0 to 1. The bound then refers to the
     /// channels, whose value range is 0 to 1 by default. Default: none.
     pub colours: Option<TransferFunction>,
@@ -149,7 +149,7 @@ impl ConvertConfig {
             missing: MissingPolicy::Error,
             missing_value: None,
             refuse_fill: true,
-            clip: false,
+            keep: Keep::default(),
             colours: None,
             block: None,
             level: 3,

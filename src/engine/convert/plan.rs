@@ -194,6 +194,9 @@ fn tiers(blocks: BlockGrid) -> u8 {
 /// Checks that the tolerance or error is valid for this bound and these samples.
 fn check_bound(input: &CodedInput) -> Result<()> {
     let config = &input.config;
+    if input.colour_transform.is_some() && !config.keep.sides.is_empty() {
+        return Err(Error::setting("keep", "sides are those of samples, and `transfer_function` codes colours"));
+    }
     let Some(error) = config.max_error else {
         let is_share = (0.0..=1.0).contains(&config.tolerance);
         return is_share.then_some(()).ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
@@ -255,8 +258,9 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let choice = if has_pyramids { trial_boxes::bytes(samples, sample, each) } else { 0 };
     let workers = rayon::current_num_threads();
     let threads = |room: &Room| room.flight.min(workers);
+    let sided = if config.keep.sides.is_empty() { 0 } else { 2 * raw }; // samples of the source, and as decoded
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
-    let scratch = samples + 2 * codes + field + raw + channel_bytes + begin + above + ZSTD_SCRATCH;
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + sided + begin + above + ZSTD_SCRATCH;
     // The blocks above and two lists of blocks that wait; vectors grow to twice their length.
     let spool = if tiers > 0 { 3 * 2 * SPOOLED } else { 0 };
     let needs = |room: &Room| {

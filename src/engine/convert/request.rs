@@ -12,7 +12,7 @@ use wavesplat_core::base::memory;
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{Archive, FrameSource};
 use wavesplat_core::wavelet::AnyBasis;
-use wavesplat_format::{Basis, Bound};
+use wavesplat_format::{Basis, Bound, Keep};
 
 /// The request for a conversion. [`run`](super::run()) completes it from the frames.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -35,8 +35,9 @@ pub struct ConvertRequest {
     /// A value that means "missing", besides NaN and infinities. Default: the one that the source declares.
     #[serde(deserialize_with = "number")]
     pub missing_value: Option<f64>,
-    /// Clamp extracted samples to the smallest and largest source sample of their window. Default: no.
-    pub clip: bool,
+    /// What samples keep besides the bound: words such as `range sign side=0.5,2`. Default: nothing.
+    #[serde(deserialize_with = "kept")]
+    pub keep: Keep,
     /// Colours to convert samples to, over a range of values. In JSON, the text that files keep. Default: none.
     #[serde(deserialize_with = "colours")]
     pub transfer_function: Option<TransferFunction>,
@@ -76,7 +77,7 @@ impl Default for ConvertRequest {
             range: None,
             missing: None,
             missing_value: None,
-            clip: false,
+            keep: Keep::default(),
             transfer_function: None,
             basis: None,
             space: None,
@@ -168,7 +169,7 @@ impl ConvertRequest {
             range: self.range,
             missing: self.missing.unwrap_or(missing),
             missing_value: archive.missing_value(self.missing_value),
-            clip: self.clip,
+            keep: self.keep.clone(),
             colours: self.transfer_function.clone(),
             block: self.block.or_else(|| self.best_for?.block(archive.grid.dims, window)),
             level: self.level,
@@ -218,6 +219,12 @@ fn number<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Option<f64>
         Some(Number::Text(text)) => text.parse().map(Some).map_err(D::Error::custom),
         None => Ok(None),
     }
+}
+
+/// Reads what is kept from its words.
+fn kept<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Keep, D::Error> {
+    let words = Option::<String>::deserialize(from)?.unwrap_or_default();
+    Keep::parse(&words).map_err(D::Error::custom)
 }
 
 /// Reads colours from the text that files keep.

@@ -6,11 +6,10 @@ use crate::file::promise::{MAX_ERROR, max_error};
 use crate::file::setting;
 use std::str::FromStr;
 use wavesplat_core::base::choice::Choice;
-use wavesplat_core::codec::CLIP;
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::{ColourTransform, Units};
 use wavesplat_core::wavelet::AnyBasis;
-use wavesplat_format::Metadata;
+use wavesplat_format::{Keep, Metadata};
 
 /// The settings of a conversion, without those that the metadata holds.
 pub(super) fn stored_settings(input: &CodedInput) -> Vec<(String, String)> {
@@ -27,7 +26,7 @@ pub(super) fn stored_settings(input: &CodedInput) -> Vec<(String, String)> {
         .chain(range)
         .chain(max_error)
         .chain((config.chain != CHAIN).then(|| ("chain", config.chain.to_string())))
-        .chain(config.clip.then(|| (CLIP.0, CLIP.1.to_string())))
+        .chain((!config.keep.is_empty()).then(|| (Keep::SETTING, config.keep.to_string())))
         .chain(colour_transform.iter().flat_map(ColourTransform::settings));
     let units = archive.units.settings().map(|(name, unit)| (name, unit.to_string()));
     let ours: Vec<(String, String)> = all.chain(units).map(|(name, value)| (name.to_string(), value)).collect();
@@ -67,7 +66,7 @@ impl ConvertConfig {
             missing: if named("missing")? == "mask" { MissingPolicy::Mask } else { MissingPolicy::Error },
             missing_value,
             refuse_fill: true,
-            clip: named(CLIP.0) == Some(CLIP.1),
+            keep: file.keep(),
             colours,
             block: Some(file.block_edge as usize),
             level: number(named("level")?)?,
@@ -90,11 +89,13 @@ pub(super) fn difference(before: &Metadata, now: &Metadata, same_program: bool) 
             ("bound", format!("{:?}", m.bound)),
             ("tolerance", format!("{:?}", m.tolerance)),
             ("missing value", format!("{:?}", m.missing_value)),
+            ("kept", m.keep().to_string()),
             ("version of the program", m.program.clone()),
         ];
         let given = given.into_iter().filter(|(what, _)| same_program || *what != "version of the program");
         let own = OWN
             .into_iter()
+            .filter(|name| ![Keep::SETTING, "clip"].contains(name)) // one setting by two names
             .chain(Units::SETTINGS)
             .chain(["frames", "region"])
             .chain(ColourTransform::SETTINGS.map(|(name, _)| name));
@@ -129,4 +130,5 @@ fn is_own(file: &Metadata, name: &str) -> bool {
 }
 
 /// The settings that [`stored_settings`] adds by itself, besides those of colours and units.
-const OWN: [&str; 9] = [MAX_ERROR, CLIP.0, "chain", "basis", "space", "window", "level", "missing", "range"];
+const OWN: [&str; 10] =
+    [MAX_ERROR, Keep::SETTING, "clip", "chain", "basis", "space", "window", "level", "missing", "range"];

@@ -83,9 +83,10 @@ pub(super) fn warnings(config: &ConvertConfig, report: &ConvertReport, found: &F
 /// Samples that are not negative are negative once decoded.
 fn negative_samples(config: &ConvertConfig, report: &ConvertReport, range: Option<(f64, f64)>) -> Option<Note> {
     let least = report.per_window.iter().filter_map(|window| window.min).fold(f64::INFINITY, f64::min);
-    let is_surprise = !config.clip && config.colours.is_none() && range?.0 >= 0.0 && least < 0.0;
+    let is_kept = config.keep.range || config.keep.sides.contains(&0.0);
+    let is_surprise = !is_kept && config.colours.is_none() && range?.0 >= 0.0 && least < 0.0;
     let text = || format!("no sample is negative, but some decoded samples are as low as {}", amount_below(least));
-    is_surprise.then(|| Note::with(text(), Remedy::Clip))
+    is_surprise.then(|| Note::with(text(), Remedy::KeepRange))
 }
 
 /// As [`amount`], of a number below 0.

@@ -333,6 +333,11 @@ impl CoefficientFile {
         !self.blocks.region(block as usize).intersect(region).is_empty()
     }
 
+    /// Whether samples keep their sides of some values at the level of detail.
+    pub fn keeps_sides(&self) -> bool {
+        self.lod == 0 && !self.metadata().keep().sides.is_empty()
+    }
+
     /// Reads the block of a directory entry; only the coefficients that `wanted` marks.
     #[doc(hidden)]
     pub fn block(&self, codec: &WindowCodec, entry: &BlockEntry, wanted: &[bool]) -> Result<Block> {
@@ -341,6 +346,8 @@ impl CoefficientFile {
             skipped.meet(entry.id);
             return Ok(Block::missing(codec, size));
         }
+        let all = codec.decodes_sides(entry).then(|| vec![true; codec.basis.coefficients()]);
+        let wanted = all.as_deref().unwrap_or(wanted);
         let above = if entry.begins_above(codec.tiers()) { self.above(codec, entry.id, wanted)? } else { None };
         Block::read(&self.reader, codec, entry, size, wanted, None, above).map_err(|e| self.failed(e))
     }

@@ -14,7 +14,7 @@ use wavesplat_core::codec::decode::Block;
 use wavesplat_core::codec::{WindowCodec, lane_groups, load_lanes};
 use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Lane;
-use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartKind};
+use wavesplat_format::{BlockEntry, BlockId, LeafEntry, PartKind, Side};
 
 /// The result of checking a file, with its source if one is given.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -79,6 +79,10 @@ pub struct Comparison {
     pub worst: Option<SampleLocation>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
+    /// Samples that do not keep what the file [keeps](wavesplat_format::Keep).
+    pub not_kept: u64,
+    /// The first of them.
+    pub first_not_kept: Option<SampleLocation>,
     /// Blocks with an error or a value beyond what the directory or the window's record states.
     pub blocks_beyond_stated: u64,
     /// The first of them.
@@ -130,6 +134,8 @@ impl Comparison {
             missing: self.missing + other.missing,
             largest_share_of_bound: self.largest_share_of_bound.max(other.largest_share_of_bound),
             series_outside: self.series_outside + other.series_outside,
+            not_kept: self.not_kept + other.not_kept,
+            first_not_kept: self.first_not_kept.or(other.first_not_kept),
             blocks_beyond_stated: self.blocks_beyond_stated + other.blocks_beyond_stated,
             first_beyond: self.first_beyond.or(other.first_beyond),
             squares: self.squares + other.squares,
@@ -355,6 +361,7 @@ fn compare(
     let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
     let (mut missing, mut range) = (0, (f64::INFINITY, f64::NEG_INFINITY));
+    let mut not_kept = (0, None);
     // The error of a sample, and what is allowed; none if it is missing in both.
     let mut compared = |i: usize, source: f64, extracted: f64| {
         if codec.is_missing(source) {
@@ -362,6 +369,12 @@ fn compare(
             return (!same(i)).then_some((f64::INFINITY, 0.0));
         }
         range = join_ranges(range, (extracted, extracted));
+        let all = [splatted[i], extracted];
+        if codec.sides.iter().any(|value| all.iter().any(|s| Side::of(*s, *value) != Side::of(source, *value)))
+            || codec.clip.is_some_and(|(lo, hi)| !(lo..=hi).contains(&extracted))
+        {
+            (not_kept.0, not_kept.1) = (not_kept.0 + 1, not_kept.1.or(Some(place(i / voxels, i % voxels))));
+        }
         Some((codec.error(splatted[i], extracted, source), codec.bound.allowed(source)))
     };
     let lanes = vec![Lane::default(); codec.frames()];
@@ -380,6 +393,7 @@ fn compare(
         }
     }
     found.missing = missing;
+    (found.not_kept, found.first_not_kept) = not_kept;
     (found, range)
 }
 

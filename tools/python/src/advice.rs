@@ -38,7 +38,7 @@ fn advice(remedy: &Remedy) -> Option<String> {
             format!("if it means missing, give missing={value}; if not, allow an error by max_error=...")
         }
         Remedy::Try(field, value) => format!("try {field}={value}"),
-        Remedy::Clip => "clip=True keeps decoded samples within the extremes of the source".into(),
+        Remedy::KeepRange => "keep='range' keeps decoded samples within the extremes of the source".into(),
         Remedy::Allow(field) => format!("allow a larger error by {field}"),
         Remedy::Replace => "overwrite=True replaces it".into(),
         Remedy::BeginAnew => "overwrite=True starts over".into(),

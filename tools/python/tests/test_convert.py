@@ -241,6 +241,6 @@ def test_memory_is_bounded(tmp_path):
 
 
 def test_warnings_are_of_the_callers_line(tmp_path):
-    with pytest.warns(UserWarning, match="clip=True") as warned:
+    with pytest.warns(UserWarning, match="keep='range'") as warned:
         wavesplat.convert(np.abs(smooth()), tmp_path / "a.wspl", tolerance=0.05)
     assert {warning.filename for warning in warned} == {__file__}

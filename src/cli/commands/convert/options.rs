@@ -9,6 +9,7 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_engine::convert::shard::Shard;
 use wavesplat_engine::convert::{BestFor, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
+use wavesplat_format::Keep;
 use wavesplat_formats::extensions;
 use wavesplat_jobs::picture::open_colours;
 
@@ -66,10 +67,11 @@ pub(crate) struct ConvertArgs {
     /// mask with --missing-value, and for files that declare a missing value]
     #[arg(long, value_parser = choice::<MissingPolicy>(), help_heading = ERROR_BOUND)]
     missing: Option<MissingPolicy>,
-    /// Clamp decoded samples to the window's original minimum and maximum, so that non-negative data stay non-negative.
-    /// Pictures from coefficients are not affected
-    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", default_value = "false", hide_default_value = true, hide_possible_values = true, action = clap::ArgAction::Set, help_heading = ERROR_BOUND)]
-    clip: bool,
+    /// Keep more than the bound; may be repeated. `range`: no sample beyond the extremes of its window. `sign`: no sample
+    /// changes its sign. `side=V,V...`: every sample stays below, at or above these values, so that isosurfaces of them
+    /// have the same pieces and holes
+    #[arg(long, value_name = "WHAT", value_parser = keep, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    keep: Vec<Keep>,
     /// A value that means "missing"
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     missing_value: Option<f64>,
@@ -186,6 +188,17 @@ enum BoundName {
     Sampled,
 }
 
+/// Parses what is to be kept.
+fn keep(words: &str) -> std::result::Result<Keep, String> {
+    Keep::parse(words)
+}
+
+/// All that some options keep.
+fn joined(all: &[Keep]) -> std::result::Result<Keep, Error> {
+    let words: Vec<String> = all.iter().map(ToString::to_string).collect();
+    Keep::parse(&words.join(" ")).map_err(|what| Error::setting("keep", what))
+}
+
 impl ConvertArgs {
     /// The request that these options make.
     pub(super) fn request(&self) -> Result<ConvertRequest> {
@@ -197,7 +210,7 @@ impl ConvertArgs {
             range: self.range()?,
             missing: self.missing,
             missing_value: self.missing_value,
-            clip: self.clip,
+            keep: joined(&self.keep)?,
             transfer_function: colours.transpose()?,
             basis: self.basis,
             space: self.space,

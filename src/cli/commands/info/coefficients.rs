@@ -49,6 +49,8 @@ struct Info {
     missing: u64,
     lost_blocks: u64,
     windows: Vec<WindowReport>,
+    /// What samples keep besides the bound; empty if nothing.
+    keep: String,
     settings: Vec<(String, String)>,
     /// The options of `wavesplat convert` that reproduce the file, by name.
     options: BTreeMap<String, String>,
@@ -104,6 +106,7 @@ impl Info {
             missing: windows.iter().map(|w| w.missing).sum(),
             lost_blocks: (0..windows.len() as u32).flat_map(|w| file.leaves(w)).map(|leaf| leaf.lost).sum(),
             windows,
+            keep: m.keep().to_string(),
             settings: m.settings.clone(),
             options: made_by::options(file),
             program: m.program.clone(),
@@ -143,6 +146,9 @@ impl Info {
             self.program,
             self.format
         );
+        if !self.keep.is_empty() {
+            let _ = writeln!(text, "keeps      {}", self.keep);
+        }
         let unit = |name: &str| self.settings.iter().find(|(n, _)| n == name).map(|(_, unit)| unit.as_str());
         if let Some(span) = &self.span {
             let _ = writeln!(text, "times      {span}");
@@ -163,7 +169,9 @@ impl Info {
             let _ =
                 writeln!(text, "LOST       {lost} blocks, when the file was recovered; wavesplat verify lists them");
         }
-        let options: Vec<String> = self.options.iter().map(|(name, value)| format!("--{name}={value}")).collect();
+        let quote = |value: &str| if value.contains(' ') { "\"" } else { "" };
+        let option = |(name, value): (&String, &String)| format!("--{name}={0}{value}{0}", quote(value));
+        let options: Vec<String> = self.options.iter().map(option).collect();
         let _ = writeln!(text, "made by    convert {}", options.join(" "));
         let shown = if verbose { self.windows.len() } else { self.windows.len().min(MOST_WINDOWS) };
         for w in &self.windows[..shown] {

@@ -103,7 +103,7 @@ fn layout(
     Layout {
         coefficients: if values || !coded { 0 } else { kept },
         frames: frames.len(),
-        values: values || exact || record.outliers > 0 || missing,
+        values: values || exact || record.outliers > 0 || missing || file.keeps_sides(),
         absent: missing,
         error_planes: error_planes(config, codec.parts()),
         order: if values || is_dense { Order::Pixels } else { Order::Planes },

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::buffer::Buffer;
-use wavesplat_core::codec::decode::Block;
+use wavesplat_core::codec::decode::{Block, WantedFrames};
 use wavesplat_core::codec::field::Field;
 
 /// A decoded block of a file.
@@ -190,12 +190,12 @@ fn put_runs(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>, values: 
 /// For each plane of a plan, the values that correct the coefficients at single voxels; empty if there are none.
 fn overrides(plan: &BatchPlan, block: &Block, field: Option<&Field<'_>>) -> Vec<Vec<(u32, f64)>> {
     let (layout, codec) = (&plan.layout, &plan.codec);
-    if !block.overrides() {
+    if !block.overrides() && !block.keeps_sides(codec) {
         return Vec::new();
     }
     let mut few = vec![Vec::new(); layout.planes()];
     let whole = field.is_none().then(|| block.field(codec));
-    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &plan.wanted.frames));
+    let samples = field.or(whole.as_ref()).map(|field| overridden_samples(block, codec, field, &plan.wanted));
     for (voxel, frame, value) in samples.into_iter().flatten() {
         few[layout.value(frame)].push((voxel as u32, value));
     }
@@ -216,16 +216,16 @@ fn misses_all(plan: &BatchPlan, block: &Block, voxel: usize) -> bool {
     (0..plan.codec.frames()).all(|f| block.is_missing(f * block.voxels + voxel))
 }
 
-/// The corrections of single frames, as (voxel, frame of the plan, value), ascending. For an outlier the correction is
-/// its sample minus the value from the coefficients; for a missing sample it is minus that value.
+/// The corrections of single frames, as (voxel, frame of the plan, value), ascending. For an outlier, and for a sample that goes to its
+/// side of a value, the correction is the sample minus the value from the coefficients; for a missing sample it is minus that value.
 fn overridden_samples(
     block: &Block,
     codec: &WindowCodec,
     field: &Field<'_>,
-    frames: &[usize],
+    frames: &WantedFrames,
 ) -> Vec<(usize, usize, f64)> {
     let mut wanted = vec![None; codec.frames()];
-    frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
+    frames.frames.iter().enumerate().for_each(|(i, f)| wanted[*f] = Some(i));
     let locate = |index: usize| wanted[index / block.voxels].map(|f| (index % block.voxels, f, index / block.voxels));
     let mut samples = vec![0.0; block.outliers.positions.len()];
     wavesplat_core::base::sample::load(codec.sample, &block.outliers.samples, &mut samples);
@@ -233,6 +233,7 @@ fn overridden_samples(
     let missing = block.missing.0.iter().enumerate().filter(|(_, m)| **m).map(|(i, _)| (i, 0.0));
     let mut targets: Vec<_> = outliers
         .chain(missing)
+        .chain(block.moved(codec, field, frames))
         .filter_map(|(index, sample)| locate(index).map(|(voxel, f, t)| (voxel, f, t, sample)))
         .collect();
     targets.sort_unstable_by_key(|(voxel, f, _, _)| (*voxel, *f));

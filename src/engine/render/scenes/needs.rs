@@ -109,7 +109,7 @@ impl WindowKind {
         Self {
             coefficients: if is_coded { record.coefficients as usize } else { 0 },
             parts: record.parts(),
-            values: !is_coded || exact || missing || record.outliers > 0,
+            values: !is_coded || exact || missing || record.outliers > 0 || file.keeps_sides(),
             missing,
         }
     }
@@ -150,7 +150,8 @@ impl Stored {
             parts.fold(0_u64, |sum, part| sum.saturating_add(part.stats.count)) as usize
         };
         self.codes = self.codes.max(count(|kind| matches!(kind, PartKind::Level(_))));
-        self.outliers = self.outliers.max(count(|kind| matches!(kind, PartKind::Outliers | PartKind::Missing)));
+        let overrides = |kind| matches!(kind, PartKind::Outliers | PartKind::Missing | PartKind::Sides);
+        self.outliers = self.outliers.max(count(overrides));
         self.exact |= entry.is_exact();
     }
 }
@@ -166,6 +167,7 @@ impl BlockNeeds {
         let exact = if stores.exact { 2 * stored * file.sample().size() } else { 0 };
         let outliers = if file.skips_damage() { stored } else { stores.outliers.min(stored) };
         let mask = if stores.missing { stored } else { 0 };
+        let sides = if file.keeps_sides() { stored * file.sample().size() } else { 0 }; // samples that show who changes its side
         let refines_time = |window: &Window| window.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));
         // Scratch are the lattices before the last passes: of one k at a time, unless time is refined.
         let plane = file.blocks.region(0).voxels();
@@ -173,11 +175,11 @@ impl BlockNeeds {
         let largest_above = file.largest_block_above();
         Self {
             what,
-            read: codes + exact + outliers * OUTLIER_BYTES + mask + file.known_bytes(),
+            read: codes + exact + outliers * OUTLIER_BYTES + mask + sides + file.known_bytes(),
             above: largest_above.min(stores.codes) * CODE_BYTES + refined(largest_above) + file.known_bytes(),
             whole: refined(largest),
             one: refined(plane),
-            always_whole: outliers > 0 || windows.iter().any(refines_time),
+            always_whole: outliers > 0 || file.keeps_sides() || windows.iter().any(refines_time),
             samples: largest * file.sample().size(),
             values: plane * size_of::<f64>(),
             coefficients: file.most_coefficients(),

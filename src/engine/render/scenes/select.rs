@@ -295,7 +295,7 @@ impl BlockSelector {
     /// As [`Self::absolute_sum`], from the samples, for blocks without outliers, missing or exact samples: with orthonormal functions,
     /// the sum is at most the norm of the series.
     fn bound_by_samples(&self, entry: &BlockEntry) -> Option<f64> {
-        let stored = [PartKind::Outliers, PartKind::Missing, PartKind::Exact, PartKind::Listed];
+        let stored = [PartKind::Outliers, PartKind::Missing, PartKind::Exact, PartKind::Listed, PartKind::Sides];
         let is_decoded = stored.iter().all(|kind| entry.part(*kind).is_none());
         let BlockStats { min, max, reached, .. } = entry.stats;
         // Neither what is splatted nor the source is farther from the stored range than the error.

@@ -32,7 +32,7 @@ def convert(
     floor: float = 0.0,
     range: tuple[float, float] | None = None,
     missing: str | float | None = None,
-    clip: bool = False,
+    keep: str = "",
     variable: str | None = None,
     axes: str | None = None,
     times: Any = None,
@@ -70,7 +70,9 @@ def convert(
         missing: "mask" keeps NaN and infinities as they are, "error" refuses them, and a number means "missing" as well. By
             default they are kept if the source says that some may be missing, and refused otherwise. Masked samples become
             NaN by "mask", or that number.
-        clip: Whether decoded samples are kept within the extremes of the source.
+        keep: What samples keep besides the bound, as words with spaces between them: "range", none is beyond the extremes of
+            its window; "sign", none changes its sign; "side=0.5,2", each stays below, at or above these values, so that their
+            isosurfaces have the same pieces and holes.
         variable: Which variable of a Dataset; all that have three axes by default.
         axes: What each axis of a Dataset's variable counts, slowest first, in letters of "tzyx" ("c" for another); by
             default that follows from names, attributes and order.
@@ -103,7 +105,7 @@ def convert(
         "bound": _bound(bound, floor),
         "range": None if range is None else [_finite("range", end) for end in pair("range", "(LO, HI)", range)],
         **_missing(missing),
-        "clip": bool(clip),
+        "keep": text("keep", keep),
         "best_for": _best_for(best_for),
         "window": None if window is None else whole("window", window),
         "chain": whole("chain", chain),
