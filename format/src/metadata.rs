@@ -233,6 +233,8 @@ impl Metadata {
         self.check_times()?;
         ensure(finite_amount(self.tolerance), || format!("invalid tolerance {}", self.tolerance))?;
         self.bound.check()?;
+        let sides = self.keep().sides.len();
+        ensure(sides <= MAX_SIDES, || format!("sides of {sides} values are kept, at most {MAX_SIDES}"))?;
         self.check_windows()
     }
 

@@ -79,6 +79,7 @@ pub fn pack_sides(codes: &[SideCodes], out: &mut Vec<u8>) {
 pub fn unpack_sides(raw: &[u8], samples: usize) -> Result<Vec<SideCodes>, String> {
     let (mut fields, mut found) = (FieldReader::new(raw), Vec::new());
     while fields.remaining() > 0 {
+        ensure(found.len() < MAX_SIDES, || format!("sides of more than {MAX_SIDES} values"))?;
         let [sides] = fields.array()?;
         ensure(sides < 1 << Side::ALL.len(), || format!("sides {sides}"))?;
         let mut codes = SideCodes { sides: SideSet(sides), ..SideCodes::default() };
@@ -91,7 +92,7 @@ pub fn unpack_sides(raw: &[u8], samples: usize) -> Result<Vec<SideCodes>, String
         }
         found.push(codes);
     }
-    ensure(!found.is_empty() && found.len() <= MAX_SIDES, || format!("sides of {} values", found.len()))?;
+    ensure(!found.is_empty(), || "sides of no value".into())?;
     Ok(found)
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What `--keep` costs, beside SZ3 with the same promise by compression-safeguards.
 
-    pip install -r tools/peers/requirements.txt compression-safeguards zstandard
+    pip install -r tools/peers/requirements.txt compression-safeguards==1.0.0rc5 zstandard
     python tools/benchmark/promises.py BIN ARCHIVE.npy ...
 
 BIN is the folder of wavesplat's programs. Prints a row of tools/benchmark/promises.md for each archive (t, z, y, x), tolerance and promise.
@@ -42,14 +42,16 @@ class Programs:
         self.file, self.back = os.path.join(work, "a.wspl"), os.path.join(work, "a.npy")
 
     def run(self, *words):
-        command = [self.program, *words, "--force", "--quiet", "--threads", "1"]
+        command = [self.program, *words, "--quiet", "--threads", "1"]
         subprocess.run(command, check=True, capture_output=True)
 
     def measured(self, tolerance, keep):
         """Bytes, and seconds of converting and of extracting."""
-        words = ["convert", self.archive, "-o", self.file, "--tolerance", tolerance, *(["--keep", keep] if keep else [])]
+        words = ["convert", self.archive, "-o", self.file, "--force", "--tolerance", tolerance, *(["--keep", keep] if keep else [])]
         convert = least_seconds(self.rounds, lambda: self.run(*words))
-        extract = least_seconds(self.rounds, lambda: self.run("extract", self.file, "-o", self.back))
+        extract = least_seconds(self.rounds, lambda: self.run("extract", self.file, "-o", self.back, "--force"))
+        if keep:
+            self.run("verify", self.file, "--against", self.archive)
         return os.path.getsize(self.file), convert, extract
 
 
@@ -95,7 +97,7 @@ def main():
     parser.add_argument("bin", metavar="BIN", help="the folder of wavesplat's programs")
     parser.add_argument("archives", metavar="ARCHIVE", nargs="+", help="a .npy file (t, z, y, x)")
     parser.add_argument("--tolerances", default="1e-2,1e-3")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--alone", action="store_true", help="without SZ3")
     parser.add_argument("--work", help="a folder for files, such as one in memory")
     args = parser.parse_args()

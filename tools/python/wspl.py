@@ -643,6 +643,7 @@ def read_sides(data: bytes, samples: int, place: str) -> list[tuple[int, float, 
     """For each value: the sides of the source's samples, the reach, and the bits."""
     r, found = Record(data, place), []
     while r.at < len(data):
+        need(len(found) < MAX_SIDES, place, "too many values")
         sides = r.get("B")
         need(sides < 8, place, "there is no such side")
         if sides:
@@ -652,7 +653,7 @@ def read_sides(data: bytes, samples: int, place: str) -> list[tuple[int, float, 
             found.append((sides, reach, r.take(n)))
         else:
             found.append((0, 0.0, b""))
-    need(1 <= len(found) <= MAX_SIDES, place, "too few or too many values")
+    need(found, place, "no values")
     return found
 
 
@@ -675,7 +676,7 @@ class Coder:
         self.chances[kind] = chance, min(shift + 1, 6)
         while self.range < 1 << 24:
             byte = self.data[self.at] if self.at < len(self.data) else 0
-            self.range, self.code, self.at = self.range << 8, self.code << 8 | byte, self.at + 1
+            self.range, self.code, self.at = self.range << 8, (self.code << 8 | byte) & 0xFFFFFFFF, self.at + 1
         return bit
 
 

@@ -84,6 +84,9 @@ impl Encoder {
                 block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut double, &mut self.codes)
             }
         };
+        if codec.sides.is_empty() {
+            (single, double) = (Buffer::default(), Buffer::default()); // packing takes memory
+        }
         let parts = match &coded {
             Some(coded) => self.coded_parts(codec, size, coded)?,
             None => self.exact_parts(codec, samples, &missing, None)?,
@@ -326,8 +329,7 @@ impl Parts {
         pack_sides(&sides.codes, raw);
         let stats = PartStats { count: sides.count, energy: 0.0, largest: 0.0 };
         self.parts.push(compressor.part(PartKind::Sides, stats, raw)?);
-        let range = join_ranges((self.stats.min, self.stats.max), sides.range);
-        (self.stats.min, self.stats.max) = range;
+        (self.stats.min, self.stats.max) = join_ranges((self.stats.min, self.stats.max), sides.range);
         Ok(())
     }
 

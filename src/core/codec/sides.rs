@@ -301,8 +301,13 @@ impl Source<'_> {
     /// block's decoded coefficients.
     pub(super) fn sides(&self, reached: f64, outliers: &Outliers, field: &Field<'_>) -> Option<CodedSides> {
         let (codec, source) = (self.codec, self.samples.contiguous());
-        let mut samples = source.to_vec(); // of the rest, no decoded sample is near a value
+        // A sample that changes is within `reached` of the value and of its source, so its source is within twice that. All others stay on
+        // their sides, so the source stands for them.
         let near = self.near(&source, 2.0 * reached);
+        if near.is_empty() {
+            return None;
+        }
+        let mut samples = source.to_vec();
         self.decode_runs(field, &near, &mut samples);
         let size = codec.sample.size();
         let missing = if self.missing.count > 0 { self.missing.mask() } else { &[] };

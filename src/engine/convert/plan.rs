@@ -13,7 +13,7 @@ use wavesplat_core::codec::bound::Bound;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
 use wavesplat_core::wavelet;
 use wavesplat_format::limits::MAX_TIERS;
-use wavesplat_format::{Basis, BlockId, Metadata};
+use wavesplat_format::{Basis, BlockId, Keep, Metadata};
 
 /// Decisions made from the configuration and the archive before any frame is read.
 #[derive(Debug)]
@@ -194,6 +194,9 @@ fn tiers(blocks: BlockGrid) -> u8 {
 /// Checks that the tolerance or error is valid for this bound and these samples.
 fn check_bound(input: &CodedInput) -> Result<()> {
     let config = &input.config;
+    if Keep::parse(&config.keep.to_string()).as_ref() != Ok(&config.keep) {
+        return Err(Error::setting("keep", "takes up to 16 finite values that ascend"));
+    }
     if input.colour_transform.is_some() && !config.keep.sides.is_empty() {
         return Err(Error::setting("keep", "sides are those of samples, and `transfer_function` codes colours"));
     }

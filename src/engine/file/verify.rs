@@ -79,9 +79,9 @@ pub struct Comparison {
     pub worst: Option<SampleLocation>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
-    /// Samples that do not keep what the file [keeps](wavesplat_format::Keep).
+    /// Samples that do not keep what the file [keeps](wavesplat_format::Keep), and windows beyond the source's extremes.
     pub not_kept: u64,
-    /// The first of them.
+    /// The first of them, or the beginning of the window.
     pub first_not_kept: Option<SampleLocation>,
     /// Blocks with an error or a value beyond what the directory or the window's record states.
     pub blocks_beyond_stated: u64,
@@ -89,6 +89,9 @@ pub struct Comparison {
     pub first_beyond: Option<BlockPlace>,
     #[serde(skip)]
     squares: f64,
+    /// The range of the source's samples.
+    #[serde(skip)]
+    source: Option<(f64, f64)>,
 }
 
 /// A block of the file.
@@ -139,6 +142,7 @@ impl Comparison {
             blocks_beyond_stated: self.blocks_beyond_stated + other.blocks_beyond_stated,
             first_beyond: self.first_beyond.or(other.first_beyond),
             squares: self.squares + other.squares,
+            source: self.source.zip(other.source).map(|(a, b)| join_ranges(a, b)).or(self.source).or(other.source),
         }
     }
 }
@@ -201,12 +205,26 @@ impl<'a> Check<'a> {
     fn window(&mut self, window: u32, source: Option<&dyn FrameWindow>, progress: &dyn Progress) -> Result<()> {
         let codec = self.file.codec(window)?;
         self.damaged.clear();
+        self.all.source = None;
         for leaf in self.file.leaves(window) {
             let coarse = (leaf.tier > 0).then(|| codec.at(leaf.tier, 0));
             self.leaf(leaf, coarse.as_ref().unwrap_or(&codec), source)?;
             progress.advance(leaf.count.into());
         }
+        self.range(window, &codec);
         Ok(())
+    }
+
+    /// Checks that the range to which decoded samples are clamped lies in that of the source's.
+    fn range(&mut self, window: u32, codec: &WindowCodec) {
+        let is_whole = self.report.damaged == 0 && self.report.unchecked == 0 && self.file.colour_transform().is_none();
+        let Some(((lo, hi), source)) = codec.clip.zip(self.all.source).filter(|_| is_whole) else { return };
+        if lo < source.0 || hi > source.1 {
+            let frame = self.file.window_range(window).start;
+            let first = SampleLocation { frame, voxel: [0; 3], channel: None };
+            self.all.not_kept += 1;
+            self.all.first_not_kept = self.all.first_not_kept.or(Some(first));
+        }
     }
 
     fn leaf(&mut self, leaf: &LeafEntry, codec: &WindowCodec, source: Option<&dyn FrameWindow>) -> Result<()> {
@@ -267,6 +285,7 @@ impl<'a> Check<'a> {
 /// extracted ones, and the splatted values.
 fn bytes_of_block(file: &CoefficientFile, is_compared: bool) -> usize {
     let compared = file.of_source().0.size() + 2 * file.sample().size() + size_of::<f64>();
+    let compared = compared + if file.keeps_sides() { size_of::<f64>() } else { 0 };
     file.block_bytes() + if is_compared { file.largest_block() * compared } else { 0 }
 }
 
@@ -361,7 +380,7 @@ fn compare(
     let same = |i: usize| original[i * size..(i + 1) * size] == bytes[i * size..(i + 1) * size];
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
     let (mut missing, mut range) = (0, (f64::INFINITY, f64::NEG_INFINITY));
-    let mut not_kept = (0, None);
+    let (mut not_kept, mut first_not_kept, mut of_source) = (0, None, range);
     // The error of a sample, and what is allowed; none if it is missing in both.
     let mut compared = |i: usize, source: f64, extracted: f64| {
         if codec.is_missing(source) {
@@ -370,11 +389,11 @@ fn compare(
         }
         range = join_ranges(range, (extracted, extracted));
         let all = [splatted[i], extracted];
-        if codec.sides.iter().any(|value| all.iter().any(|s| Side::of(*s, *value) != Side::of(source, *value)))
-            || codec.clip.is_some_and(|(lo, hi)| !(lo..=hi).contains(&extracted))
-        {
-            (not_kept.0, not_kept.1) = (not_kept.0 + 1, not_kept.1.or(Some(place(i / voxels, i % voxels))));
+        if codec.sides.iter().any(|value| all.iter().any(|s| Side::of(*s, *value) != Side::of(source, *value))) {
+            not_kept += 1;
+            first_not_kept = first_not_kept.or(Some(place(i / voxels, i % voxels)));
         }
+        of_source = join_ranges(of_source, (source, source));
         Some((codec.error(splatted[i], extracted, source), codec.bound.allowed(source)))
     };
     let lanes = vec![Lane::default(); codec.frames()];
@@ -393,7 +412,7 @@ fn compare(
         }
     }
     found.missing = missing;
-    (found.not_kept, found.first_not_kept) = not_kept;
+    (found.not_kept, found.first_not_kept, found.source) = (not_kept, first_not_kept, Some(of_source));
     (found, range)
 }
 

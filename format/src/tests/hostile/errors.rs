@@ -75,7 +75,7 @@ fn newer_files_are_unsupported() {
 fn required_features_must_be_announced() {
     for original in [lean(), fat()] {
         let used = original.file[16];
-        for announced in (0..16).filter(|bits| bits & 0b10 == 0) {
+        for announced in (0..32).filter(|bits| bits & 0b10 == 0) {
             let file = Pieces::new(&original.file).forge(&mut |piece, _, bytes| {
                 if piece == Piece::Header {
                     bytes[16] = announced;

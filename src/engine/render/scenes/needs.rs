@@ -165,7 +165,7 @@ impl BlockNeeds {
             false => stored * (CODE_BYTES + size_of::<i32>()),
         };
         let exact = if stores.exact { 2 * stored * file.sample().size() } else { 0 };
-        let outliers = if file.skips_damage() { stored } else { stores.outliers.min(stored) };
+        let outliers = if file.skips_damage() || file.keeps_sides() { stored } else { stores.outliers.min(stored) };
         let mask = if stores.missing { stored } else { 0 };
         let sides = if file.keeps_sides() { stored * file.sample().size() } else { 0 }; // samples that show who changes its side
         let refines_time = |window: &Window| window.pyramid.as_ref().is_some_and(|p| p.order.contains(&Axis::T));

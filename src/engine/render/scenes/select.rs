@@ -215,7 +215,8 @@ impl BlockSelector {
             kept.errors[1..].fill(0.0);
         }
         kept.errors[1 + part.level] = part.entry.stats.largest;
-        kept.entry.parts.retain(|p| p.kind != part.entry.kind);
+        // Sides say how fully decoded samples change.
+        kept.entry.parts.retain(|p| p.kind != part.entry.kind && p.kind != PartKind::Sides);
     }
 
     /// The change caused by the parts of `without` and one more part.
