@@ -14,7 +14,7 @@ use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{Basis, Bound, ConvertConfig};
 use wavesplat::render::{CoefficientScene, LeftOut, Quantity, RenderConfig, RenderReport, Scene, SplatSource};
 use wavesplat::view::camera::View;
-use wavesplat_format::{BlockEntry, PartKind};
+use wavesplat_format::{BlockEntry, Keep, PartKind};
 
 /// The reference pictures of one view, with which several pictures are compared.
 struct Reference<'a> {
@@ -112,6 +112,26 @@ fn kernels_far_narrower_and_wider_than_a_cell_are_certified() {
     for sigma in [0.02, 0.1, 0.3, 1.0, 4.0, 50.0] {
         for view in views() {
             Reference::new(&trial, view, Some(sigma)).check(&mut coefficients(&trial), Some(0.7));
+        }
+    }
+}
+
+#[test]
+fn pictures_of_files_that_keep_sides_are_certified() {
+    for (basis, words) in [(Basis::Learned, "side=0.3,-0.2"), (Basis::Samples, "sign range"), (Basis::Haar, "side=0.1")]
+    {
+        let memory = archive(SKEWED, SampleType::F32, &field(&SKEWED, 6, 5));
+        let config = ConvertConfig { keep: Keep::parse(words).unwrap(), ..settings(basis, 8, 0.05) };
+        let trial = Trial::new("sides", memory, config);
+        let reader = trial.file.open();
+        let entries = reader.leaves(0).iter().flat_map(|leaf| reader.leaf(leaf).unwrap());
+        assert!(entries.into_iter().any(|entry| entry.part(PartKind::Sides).is_some()), "{basis:?}");
+        for view in views() {
+            let truth = Reference::new(&trial, view, None);
+            for allowed in [None, Some(0.1), Some(0.7), Some(2.0), Some(100.0)] {
+                truth.check(&mut coefficients(&trial), allowed);
+                truth.check(&mut samples(&trial), allowed);
+            }
         }
     }
 }
