@@ -1,4 +1,4 @@
-//! Bits in about their entropy: a binary arithmetic coder whose chances adapt to the bits
+//! Codes bits in about as much space as their entropy: a binary arithmetic coder whose chances adapt to the bits
 //! ([Martin](https://sachingarg.com/compression/entropy_coding/range_coder.pdf)).
 //!
 //! An interval of 32 bits is divided at `bound = (range >> 16) * chance` for each bit: 0 takes the part below, 1 that above. Once the
@@ -17,14 +17,16 @@ impl Chance {
     /// Both bits are equally likely.
     pub const EVEN: Self = Self { of_zero: 1 << 15, shift: 1 };
 
-    /// Learns from a bit. The first bits of a kind count most.
-    fn add(&mut self, bit: bool) {
+    /// Learns from a bit, of which the first of a kind count most. Returns the length of the bit's part of an interval, which is divided at
+    /// `bound`.
+    fn learn(&mut self, bit: bool, bound: u32, range: u32) -> u32 {
         if bit {
             self.of_zero -= self.of_zero >> self.shift;
         } else {
             self.of_zero += ((1 << 16) - self.of_zero) >> self.shift;
         }
         self.shift = (self.shift + 1).min(SLOWEST);
+        if bit { range - bound } else { bound }
     }
 
     /// Where an interval is divided.
@@ -33,7 +35,7 @@ impl Chance {
     }
 }
 
-/// Chances move by at least one part in 2^this. So none becomes 0 or 1.
+/// Chances move by at least one part in 2^this, rounded down, so none reaches 0 or 1.
 const SLOWEST: u32 = 6;
 
 /// Intervals are at least this long.
@@ -61,13 +63,8 @@ impl BitEncoder {
     /// Writes a bit of a kind.
     pub fn put(&mut self, chance: &mut Chance, bit: bool) {
         let bound = chance.bound(self.range);
-        if bit {
-            self.low += u64::from(bound);
-            self.range -= bound;
-        } else {
-            self.range = bound;
-        }
-        chance.add(bit);
+        self.low += if bit { u64::from(bound) } else { 0 };
+        self.range = chance.learn(bit, bound, self.range);
         while self.range < SHORTEST {
             self.range <<= 8;
             self.settle();
@@ -126,13 +123,8 @@ impl<'a> BitDecoder<'a> {
     pub fn take(&mut self, chance: &mut Chance) -> bool {
         let bound = chance.bound(self.range);
         let bit = self.code >= bound;
-        if bit {
-            self.code -= bound;
-            self.range -= bound;
-        } else {
-            self.range = bound;
-        }
-        chance.add(bit);
+        self.code -= if bit { bound } else { 0 };
+        self.range = chance.learn(bit, bound, self.range);
         while self.range < SHORTEST {
             self.range <<= 8;
             self.shift();

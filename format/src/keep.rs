@@ -26,7 +26,8 @@ impl Keep {
     pub fn parse(words: &str) -> Result<Self, String> {
         let mut keep = Self::default();
         words.split_whitespace().try_for_each(|word| keep.add(word))?;
-        let count = keep.sorted().sides.len();
+        keep.sort();
+        let count = keep.sides.len();
         if count > MAX_SIDES { Err(format!("sides of {count} values; at most {MAX_SIDES}")) } else { Ok(keep) }
     }
 
@@ -40,7 +41,7 @@ impl Keep {
                 _ => {}
             }
         }
-        keep.sorted();
+        keep.sort();
         keep
     }
 
@@ -59,11 +60,10 @@ impl Keep {
         Ok(())
     }
 
-    fn sorted(&mut self) -> &Self {
+    fn sort(&mut self) {
         self.sides.iter_mut().for_each(|value| *value += 0.0); // -0 is 0
         self.sides.sort_by(f64::total_cmp);
         self.sides.dedup();
-        self
     }
 
     /// Whether nothing is kept.

@@ -18,7 +18,7 @@ pub const MAX_LEVELS: usize = 32;
 /// Values of a block that lists them: a place in the list takes 16 bits.
 pub const MAX_LISTED: usize = 1 << 16;
 
-/// Values of which samples keep their sides.
+/// Kept values of a file: samples stay below, at or above each.
 pub const MAX_SIDES: usize = 16;
 
 /// Parts of one block: every level, outliers, missing samples, exact samples, sides.

@@ -320,7 +320,7 @@ class Metadata:
 
     @property
     def sides(self) -> list[float]:
-        """The values of which samples keep their sides."""
+        """The kept values, ascending: samples stay below, at or above each."""
         named = [float(value) for word in self.kept if word.startswith("side=") for value in word[5:].split(",")]
         return sorted({value + 0.0 for value in named} | ({0.0} if "sign" in self.kept else set()))
 

@@ -9,14 +9,11 @@ use super::buffer::Buffer;
 use super::codes::Codes;
 use super::field::{Above, Field, LONG_RUN, Plane, RUN, Stored};
 use super::rows::Change;
-use super::sides::{Fixed, Walk};
 use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
 use std::ops::Range;
-use wavesplat_format::{
-    Axis, Basis, BlockEntry, Error, Outliers, PartEntry, PartKind, Reader, Result, Side, SideCodes, Storage,
-};
+use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, SideCodes, Storage};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -89,7 +86,7 @@ impl Block {
             outliers: reader.outliers(entry)?,
             missing: reader.missing(entry)?.unwrap_or_default(),
             exact: reader.exact(entry)?,
-            sides: read_sides(reader, codec, entry)?,
+            sides: Self::read_sides(reader, codec, entry)?,
             bytes_read: 0,
         };
         block.thin_samples(codec);
@@ -429,12 +426,7 @@ impl Block {
         for (index, bytes) in self.outliers.positions.iter().map(|p| *p as usize).zip(outliers) {
             sample::load(codec.sample, bytes, &mut values[index..=index]);
         }
-        if self.keeps_sides(codec) {
-            let mut rounded = vec![0.0; values.len()];
-            sample::load(codec.sample, &samples, &mut rounded);
-            let moved = values.iter_mut().zip(rounded).filter(|(value, sample)| is_beside(codec, **value, *sample));
-            moved.for_each(|(value, sample)| *value = sample);
-        }
+        self.put_moved(codec, &samples, &mut values);
         (samples, values)
     }
 
@@ -457,43 +449,6 @@ impl Block {
         out
     }
 
-    /// Whether samples keep their sides of some values: not where detail is left out, and exact samples have them anyway.
-    pub fn keeps_sides(&self, codec: &WindowCodec) -> bool {
-        !codec.sides.is_empty() && codec.lod == 0 && self.exact.is_none()
-    }
-
-    /// The samples of some frames that are on another side of a kept value than what their coefficients give, by index. Those stored
-    /// exactly or missing are left out. `field` has the coefficients that the frames need.
-    pub fn moved(&self, codec: &WindowCodec, field: &Field<'_>, wanted: &WantedFrames) -> Vec<(usize, f64)> {
-        if !self.keeps_sides(codec) {
-            return Vec::new();
-        }
-        let (samples, size, mut moved, mut run) = (self.samples(codec), codec.sample.size(), Vec::new(), Vec::new());
-        self.for_each_run_of(codec, field, wanted, |first, values| {
-            run.resize(values.len(), 0.0);
-            sample::load(codec.sample, &samples[first * size..][..values.len() * size], &mut run);
-            let pairs = (first..).zip(values.iter().zip(&run));
-            let beside = pairs.filter(|(_, (value, sample))| is_beside(codec, **value, **sample));
-            moved.extend(
-                beside.filter(|(index, _)| !self.is_fixed(*index)).map(|(index, (_, sample))| (index, *sample)),
-            );
-        });
-        moved
-    }
-
-    /// Whether a sample is stored exactly or missing.
-    fn is_fixed(&self, index: usize) -> bool {
-        self.is_missing(index) || self.outliers.positions.binary_search(&(index as u32)).is_ok()
-    }
-
-    /// Moves samples to their sides of the kept values.
-    fn put_on_sides(&self, codec: &WindowCodec, samples: &mut [u8]) {
-        let fixed = Fixed { exact: &self.outliers.positions, missing: &self.missing.0 };
-        for (value, codes) in codec.sides.iter().zip(&self.sides) {
-            Walk::new(codec, self.size, *value, fixed).apply(codes, samples);
-        }
-    }
-
     /// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
     fn clip(&self, codec: &WindowCodec, frames: &[usize], samples: &mut [u8]) {
         let Some((lo, hi)) = codec.clip else { return };
@@ -510,24 +465,6 @@ impl Block {
             out[index * size..(index + 1) * size].copy_from_slice(bytes);
         }
     }
-}
-
-/// Whether two numbers are on different sides of a kept value.
-fn is_beside(codec: &WindowCodec, a: f64, b: f64) -> bool {
-    codec.sides.iter().any(|side| Side::of(a, *side) != Side::of(b, *side))
-}
-
-/// Reads how samples get to their sides, if they are decoded with all detail.
-fn read_sides<S: Storage>(reader: &Reader<S>, codec: &WindowCodec, entry: &BlockEntry) -> Result<Vec<SideCodes>> {
-    if !codec.decodes_sides(entry) {
-        return Ok(Vec::new());
-    }
-    let sides = reader.sides(entry)?.unwrap_or_default();
-    if sides.len() == codec.sides.len() {
-        return Ok(sides);
-    }
-    let (has, keeps) = (sides.len(), codec.sides.len());
-    Err(Error::Invalid(format!("{}: sides of {has} values, but the file keeps those of {keeps}", entry.id)))
 }
 
 fn is_level(part: &PartEntry) -> bool {

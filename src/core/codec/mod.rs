@@ -20,6 +20,7 @@ mod gain;
 mod group;
 mod listed;
 mod load;
+mod moved;
 mod order;
 pub mod part;
 pub(crate) mod pyramid;
@@ -92,7 +93,7 @@ pub struct WindowCodec {
     pub missing_value: Option<f64>,
     /// If set, extracted samples are clamped to this range, the range of the source's samples in the window.
     pub clip: Option<(f64, f64)>,
-    /// The values of which samples keep their sides.
+    /// The kept values, ascending: samples stay below, at or above each.
     pub sides: Arc<[f64]>,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,

@@ -35,7 +35,7 @@ impl Nearest {
     }
 }
 
-/// The samples of a block, and the value of which they keep their side.
+/// The samples of a block, and a kept value: samples stay below, at or above it.
 pub(super) struct Walk<'a> {
     ty: SampleType,
     /// Voxels along x, y, z.

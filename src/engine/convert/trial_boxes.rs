@@ -91,7 +91,7 @@ impl TrialBoxes<'_> {
     }
 
     /// The places of `count` boxes of a size in which samples change, or others if too few are found. Looks from place `first` on.
-    /// Takes boxes that change the most and boxes that change less.
+    /// Of those that change, takes every few in the order of their changes, from the most on.
     pub(super) fn active(&self, first: usize, count: usize, size: [usize; 3]) -> Result<Active> {
         let (mut active, mut quiet) = (Vec::new(), Vec::new());
         for number in first..first + count * MOST_CANDIDATES {
@@ -113,8 +113,8 @@ impl TrialBoxes<'_> {
         Ok(Active { places, share })
     }
 
-    /// In how many layers of a few frames the samples of a box change, with time or within the layer; 0 if one value is within the bound
-    /// of all.
+    /// One more than the number of layers of a few frames in which the samples of a box change, with time or within the layer; 0 if one
+    /// value is within the bound of all.
     fn changes(&self, place: &BoxPlace) -> Result<usize> {
         let (window, ty) = (self.channels[place.channel], self.archive.sample);
         let mut frames = LOOKED_AT.map(|share| ((window.frames() - 1) as f64 * share) as usize).to_vec();

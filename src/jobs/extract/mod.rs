@@ -290,7 +290,7 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// The blocks that need the whole block above them. Blocks of which only a tiny part is decoded need a part of it.
+    /// The blocks that need the whole block above them. A block needs only a part of it if a tiny part of the block is decoded.
     fn sharing<'e>(
         &self,
         codec: &WindowCodec,

@@ -170,8 +170,8 @@ impl Info {
                 writeln!(text, "LOST       {lost} blocks, when the file was recovered; wavesplat verify lists them");
         }
         let quote = |value: &str| if value.contains(' ') { "\"" } else { "" };
-        let option = |(name, value): (&String, &String)| format!("--{name}={0}{value}{0}", quote(value));
-        let options: Vec<String> = self.options.iter().map(option).collect();
+        let options = self.options.iter().map(|(name, value)| format!("--{name}={0}{value}{0}", quote(value)));
+        let options: Vec<String> = options.collect();
         let _ = writeln!(text, "made by    convert {}", options.join(" "));
         let shown = if verbose { self.windows.len() } else { self.windows.len().min(MOST_WINDOWS) };
         for w in &self.windows[..shown] {
