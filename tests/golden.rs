@@ -230,10 +230,10 @@ fn features_of_later_versions_are_refused_by_name() {
     file[10] = 7; // the minor version
     file[24] = 0xFF; // optional features
     assert_eq!(refused(&mut file), None);
-    file[16] = 0b10_0000; // a required feature
+    file[16] = 0b100_0000; // a required feature
     file[48..48 + 20].copy_from_slice(b"bases by wavesplat 3");
     let (code, message) = refused(&mut file).unwrap();
-    assert!(code == 3 && message.contains("required feature bit 5 (bases by wavesplat 3)"), "{message}");
+    assert!(code == 3 && message.contains("required feature bit 6 (bases by wavesplat 3)"), "{message}");
     file[16] = 0;
     file[8] = 2;
     let (code, message) = refused(&mut file).unwrap();

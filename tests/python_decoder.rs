@@ -48,7 +48,8 @@ fn random_file(random: &mut Random) -> Vec<u8> {
     let rainbow = TransferFunction::open("rainbow").unwrap();
     let colours = (random.below(8) == 0).then_some(rainbow); // most values lie beyond the ends of the map
     let block = Some(1 + random.below(24));
-    let words = ["", "", "range", "sign", "side=0.3,0 range", "side=-7,-0.25,0.5,9"][random.below(6)];
+    let words = ["", "", "range", "sign", "side=0.3,0 range", "side=-7,-0.25,0.5,9", "sum", "sum range side=0.25"];
+    let words = words[random.below(words.len())];
     let keep = if colours.is_some() { Keep::default() } else { Keep::parse(words).unwrap() };
     let config = ConvertConfig { coding: SchemeConstraint { basis, space }, bound, block, colours, keep, ..plain };
     stored(&mut Memory::new(Grid::unit(dims), ty, data), &config).bytes()

@@ -86,7 +86,7 @@ fn pyramids_decode_to_the_specified_bits() {
         let expected = spelled_out(&pyramid).decode(extents, step, &codes);
         let what = format!("case {case}: {pyramid:?}, {extents:?}, step {step:e}");
         let scheme = Scheme { pyramid: Some(pyramid), ..Scheme::along_time(Basis::Samples) };
-        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
+        let bound = ErrorBound::new(Bound::Pointwise, 0.1, 0.1);
         let codec = WindowCodec::new(scheme, extents[3], SampleType::F64, bound, 20);
         let block = Block::from_codes(&codec, [extents[0], extents[1], extents[2]], step, &codes);
         let field = block.field(&codec);

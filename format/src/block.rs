@@ -74,6 +74,8 @@ pub enum PartKind {
     Listed,
     /// On which side of some values samples are that would be decoded on another.
     Sides,
+    /// What samples need so that the sums of frames are those of the source.
+    Sums,
 }
 
 impl PartKind {
@@ -91,6 +93,7 @@ impl PartKind {
             Self::Exact => [3, 0],
             Self::Listed => [3, 1],
             Self::Sides => [4, 0],
+            Self::Sums => [5, 0],
         }
     }
 
@@ -103,6 +106,7 @@ impl PartKind {
             [3, 0] => Some(Self::Exact),
             [3, 1] => Some(Self::Listed),
             [4, 0] => Some(Self::Sides),
+            [5, 0] => Some(Self::Sums),
             _ => None,
         }
     }
@@ -117,6 +121,7 @@ impl fmt::Display for PartKind {
             Self::Exact => f.write_str("exact samples"),
             Self::Listed => f.write_str("listed samples"),
             Self::Sides => f.write_str("sides"),
+            Self::Sums => f.write_str("sums"),
         }
     }
 }

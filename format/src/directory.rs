@@ -131,14 +131,18 @@ impl BlockEntry {
         ensure(self.parts.len() <= MAX_PARTS, || format!("{} parts, at most {MAX_PARTS}", self.parts.len()))?;
         let ascend = self.parts.is_sorted_by(|a, b| a.kind < b.kind);
         ensure(ascend, || "parts out of order".into())?;
-        let lossy = |part: &PartEntry| matches!(part.kind, PartKind::Level(_) | PartKind::Outliers | PartKind::Sides);
+        let lossy = |part: &PartEntry| {
+            matches!(part.kind, PartKind::Level(_) | PartKind::Outliers | PartKind::Sides | PartKind::Sums)
+        };
         let both = self.is_exact() && self.parts.iter().any(lossy);
-        ensure(!both, || "both exact samples and coefficients, outliers or sides".into())?;
+        ensure(!both, || "both exact samples and coefficients, outliers, sides or sums".into())?;
         let is_listed = self.part(PartKind::Listed).is_some();
         ensure(!is_listed || self.part(PartKind::Exact).is_none(), || "exact samples twice".into())?;
         ensure(!is_listed || announced.listed, || "listed values, which the header does not announce".into())?;
         let has_sides = self.part(PartKind::Sides).is_some();
         ensure(!has_sides || announced.sided, || "sides, which the header does not announce".into())?;
+        let has_sums = self.part(PartKind::Sums).is_some();
+        ensure(!has_sums || announced.summed, || "sums, which the header does not announce".into())?;
         let lost = !self.lost || self.encoded() == Self::lost(self.id).encoded();
         ensure(lost, || "a lost block with parts or statistics".into())?;
         self.check_tier(tiers)?;

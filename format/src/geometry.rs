@@ -10,6 +10,7 @@ use crate::listed::max_listed;
 use crate::planes::bitmap_len;
 use crate::pyramid::{PassBox, Pyramid};
 use crate::sides::max_sides;
+use crate::sums::max_sums;
 use crate::window::Window;
 
 /// The sizes of one block.
@@ -66,6 +67,7 @@ impl BlockGeometry<'_> {
         match kind {
             PartKind::Level(level) => self.codes(level).unwrap_or(0) as u64,
             PartKind::Sides => (self.samples() * MAX_SIDES) as u64,
+            PartKind::Sums => self.window.frames.into(),
             _ => self.samples() as u64,
         }
     }
@@ -81,6 +83,7 @@ impl BlockGeometry<'_> {
             PartKind::Missing => (bitmap_len(self.samples()) as u64).saturating_add(count.saturating_mul(size)),
             PartKind::Exact | PartKind::Listed => count.saturating_mul(size),
             PartKind::Sides => max_sides(self.samples()) as u64,
+            PartKind::Sums => max_sums(self.window.frames as usize, self.samples()) as u64,
         }
     }
 
@@ -90,6 +93,7 @@ impl BlockGeometry<'_> {
             PartKind::Level(level) if self.window.pyramid.is_some() => max_packed(&self.boxes(level)) as u64,
             PartKind::Listed => max_listed(self.sample_size, self.extents()) as u64,
             PartKind::Sides => max_sides(self.samples()) as u64,
+            PartKind::Sums => max_sums(self.window.frames as usize, self.samples()) as u64,
             _ => self.raw_len(kind, self.max_count(kind), 4),
         }
     }
@@ -109,7 +113,7 @@ impl BlockGeometry<'_> {
         })?;
         let possible = match kind {
             PartKind::Level(_) if self.window.pyramid.is_some() => raw_len <= self.max_raw_len(kind),
-            PartKind::Listed | PartKind::Sides => raw_len <= self.max_raw_len(kind),
+            PartKind::Listed | PartKind::Sides | PartKind::Sums => raw_len <= self.max_raw_len(kind),
             PartKind::Level(_) => (1..=4).any(|width| self.raw_len(kind, count, width) == raw_len),
             _ => self.raw_len(kind, count, 1) == raw_len,
         };

@@ -18,16 +18,17 @@ pub(crate) const VERSION: (u16, u16) = (1, 0);
 /// The version of files with any feature.
 const FEATURES_VERSION: (u16, u16) = (1, 1);
 
-/// The version of files with tiers, listed values or sides.
+/// The version of files with tiers, listed values, sides or sums.
 const LATEST_VERSION: (u16, u16) = (1, 2);
 
 /// The required features that this reader supports, by bit, as messages for readers that do not.
-const REQUIRED: [&str; 5] = [
+const REQUIRED: [&str; 6] = [
     "nested parts (version 1.1 of the format): wavesplat 0.2 or later",
     "a description (version 1.1 of the format): wavesplat 0.2 or later",
     "tiers (version 1.2 of the format): wavesplat 0.2 or later",
     "listed values (version 1.2 of the format): wavesplat 0.2 or later",
     "sides of values (version 1.2 of the format): wavesplat 0.2 or later",
+    "sums of frames (version 1.2 of the format): wavesplat 0.2 or later",
 ];
 
 /// The bit of [`Packing::Nested`].
@@ -45,6 +46,9 @@ const LISTED: u64 = 8;
 /// The bit of sides.
 const SIDED: u64 = 16;
 
+/// The bit of sums.
+const SUMMED: u64 = 32;
+
 /// The required features of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Features {
@@ -58,6 +62,8 @@ pub struct Features {
     pub listed: bool,
     /// Whether samples keep their sides of some values.
     pub sided: bool,
+    /// Whether the sums of frames are those of the source.
+    pub summed: bool,
 }
 
 impl Features {
@@ -84,7 +90,14 @@ impl Features {
     fn of_bits(required: u64) -> Self {
         let packing = if required & NESTED == 0 { Packing::Flat } else { Packing::Nested };
         let has = |bit: u64| required & bit != 0;
-        Self { packing, described: has(DESCRIBED), tiered: has(TIERED), listed: has(LISTED), sided: has(SIDED) }
+        Self {
+            packing,
+            described: has(DESCRIBED),
+            tiered: has(TIERED),
+            listed: has(LISTED),
+            sided: has(SIDED),
+            summed: has(SUMMED),
+        }
     }
 
     /// The field `required` of the header.
@@ -96,6 +109,7 @@ impl Features {
             | bit(self.tiered, TIERED)
             | bit(self.listed, LISTED)
             | bit(self.sided, SIDED)
+            | bit(self.summed, SUMMED)
     }
 }
 

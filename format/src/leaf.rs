@@ -97,7 +97,7 @@ impl LeafEntry {
                 PartKind::Level(_) => &mut self.coded,
                 PartKind::Outliers => &mut self.outliers,
                 PartKind::Missing => &mut self.missing,
-                PartKind::Exact | PartKind::Listed | PartKind::Sides => continue,
+                PartKind::Exact | PartKind::Listed | PartKind::Sides | PartKind::Sums => continue,
             };
             *sum = sum.saturating_add(part.stats.count);
             self.energy += if matches!(part.kind, PartKind::Level(_)) { part.stats.energy } else { 0.0 };

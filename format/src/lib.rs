@@ -34,6 +34,7 @@ mod segments;
 mod sides;
 mod storage;
 mod structure;
+mod sums;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -54,7 +55,7 @@ pub use error::{Error, Result};
 pub use file_id::FileId;
 pub use geometry::BlockGeometry;
 pub use header::Features;
-pub use keep::Keep;
+pub use keep::{Derivative, DerivativeBound, Keep, RelativeBound};
 pub use leaf::LeafEntry;
 pub use listed::{Listed, unpack_listed};
 pub use metadata::{Bound, Metadata};
@@ -69,5 +70,6 @@ pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
 pub use sides::{Side, SideCodes, SideSet, pack_sides, unpack_sides};
 pub use storage::Storage;
+pub use sums::{SumCodes, pack_sums, unpack_sums};
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

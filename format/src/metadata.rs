@@ -152,7 +152,8 @@ impl Metadata {
         let nested = self.windows.iter().any(|window| window.packing() == Packing::Nested);
         let packing = if nested { Packing::Nested } else { Packing::Flat };
         let tiered = self.windows.iter().any(|window| window.tiers() > 0);
-        Features { packing, tiered, sided: !self.keep().sides.is_empty(), ..Features::default() }
+        let keep = self.keep();
+        Features { packing, tiered, sided: !keep.sides.is_empty(), summed: keep.sum, ..Features::default() }
     }
 
     /// The id of the file that a conversion writes: XXH3-128 of the start record's bytes followed by the digest of the

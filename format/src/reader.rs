@@ -17,6 +17,7 @@ use crate::metadata::Metadata;
 use crate::payload::{Outliers, unpack_codes, unpack_exact, unpack_missing, unpack_outliers};
 use crate::section::{FRAME, SectionId, decompress, read_checked, read_section};
 use crate::sides::{SideCodes, unpack_sides};
+use crate::sums::{SumCodes, unpack_sums};
 use crate::{Error, Result, Storage};
 
 /// An open file. Every method takes `&self`; threads can share it if the storage is `Sync`.
@@ -303,6 +304,18 @@ impl<S: Storage> Reader<S> {
         unpacked(block, part, sides, |_| part.stats.count as usize).map(Some)
     }
 
+    /// Reads what keeps the sums of a block's frames; `None` if decoded samples have them.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] if the block is lost; otherwise as [`Self::part`].
+    pub fn sums(&self, block: &BlockEntry) -> Result<Option<SumCodes>> {
+        self.check_present(block)?;
+        let Some(part) = block.part(PartKind::Sums) else { return Ok(None) };
+        let (raw, geometry) = (self.part(block, part)?, self.geometry(block.id)?);
+        let sums = unpack_sums(&raw, geometry.window.frames as usize, geometry.samples());
+        unpacked(block, part, sums, |sums| sums.count() as usize).map(Some)
+    }
+
     /// Checks the checksum of every part of a block.
     ///
     /// # Errors
@@ -339,6 +352,7 @@ fn unpack(geometry: &BlockGeometry<'_>, part: &PartEntry, raw: &[u8]) -> ParseRe
         PartKind::Exact => unpack_exact(raw, size, samples).map(|bytes| bytes.len() / size),
         PartKind::Listed => unpack_listed(raw, size, geometry.extents()).map(|bytes| bytes.len() / size),
         PartKind::Sides => unpack_sides(raw, samples).map(|_| part.stats.count as usize), // only decoding shows it
+        PartKind::Sums => unpack_sums(raw, geometry.window.frames as usize, samples).map(|sums| sums.count() as usize),
     }
 }
 

@@ -73,6 +73,7 @@ pub(crate) struct Content {
     pub(crate) missing: Option<(Vec<bool>, Vec<u8>)>,
     pub(crate) exact: Option<Vec<u8>>,
     pub(crate) sides: Option<Vec<SideCodes>>,
+    pub(crate) sums: Option<SumCodes>,
 }
 
 fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
@@ -97,6 +98,12 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
         found.outliers = Outliers { samples: bytes(positions.len()), positions };
         let is_nested = geometry.window.packing() == Packing::Nested;
         found.sides = is_nested.then(|| vec![SideCodes::default(), side_codes(&mut bytes(total))]);
+        let frames = 0..i64::from(geometry.window.frames);
+        found.sums = is_nested.then(|| SumCodes {
+            unit: 0.25,
+            frames: frames.map(|t| 7 - 300 * t).collect(),
+            unshifted: (0..total as u32).step_by(5).collect(),
+        });
     }
     found
 }
@@ -178,6 +185,11 @@ pub(crate) fn encode(
         pack_sides(sides, &mut raw);
         part(PartKind::Sides, 1, 0.0, 0.0, &raw);
     }
+    if let Some(sums) = &content.sums {
+        let mut raw = Vec::new();
+        pack_sums(sums, &mut raw);
+        part(PartKind::Sums, sums.frames.len(), 0.0, 0.0, &raw);
+    }
     let stats = BlockStats { step: 0.5, min: -1.0, max: 2.0, reached: 0.125, squared_error: 0.5, dropped: 0.25 };
     let stats = if id.tier > 0 { BlockStats { step: 0.5, ..BlockEntry::lost(id).stats } } else { stats };
     EncodedBlock { id, stats, parts }
@@ -201,7 +213,7 @@ pub(crate) fn blocks(metadata: &mut Metadata, seed: u64) -> Vec<(EncodedBlock, C
     }
     count(metadata, &found);
     if found.iter().any(|(_, content)| content.sides.is_some()) {
-        metadata.settings.push((Keep::SETTING.into(), "side=-3,0.5".into()));
+        metadata.settings.push((Keep::SETTING.into(), "sum side=-3,0.5".into()));
     }
     found
 }
@@ -215,7 +227,7 @@ pub(crate) fn count(metadata: &mut Metadata, blocks: &[(EncodedBlock, Content)])
                 PartKind::Level(_) => window.coded += part.stats.count,
                 PartKind::Outliers => window.outliers += part.stats.count,
                 PartKind::Missing => window.missing += part.stats.count,
-                PartKind::Exact | PartKind::Listed | PartKind::Sides => {}
+                PartKind::Exact | PartKind::Listed | PartKind::Sides | PartKind::Sums => {}
             }
         }
     }
@@ -292,5 +304,5 @@ fn read_content<S: Storage>(reader: &Reader<S>, block: &BlockEntry) -> Result<Co
     };
     let levels = (0..reader.geometry(block.id)?.window.parts() as u8).map(level).collect::<Result<_>>()?;
     let (outliers, missing, exact) = (reader.outliers(block)?, reader.missing(block)?, reader.exact(block)?);
-    Ok(Content { levels, outliers, missing, exact, sides: reader.sides(block)? })
+    Ok(Content { levels, outliers, missing, exact, sides: reader.sides(block)?, sums: reader.sums(block)? })
 }

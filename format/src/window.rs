@@ -173,7 +173,7 @@ impl WindowEnd {
                 PartKind::Level(_) => self.coded += part.stats.count,
                 PartKind::Outliers => self.outliers += part.stats.count,
                 PartKind::Missing => self.missing += part.stats.count,
-                PartKind::Exact | PartKind::Listed | PartKind::Sides => {}
+                PartKind::Exact | PartKind::Listed | PartKind::Sides | PartKind::Sums => {}
             }
         }
     }

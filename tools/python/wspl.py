@@ -88,7 +88,7 @@ LEAF = Layout(
 )
 
 # Kinds of parts and sections (section 4).
-LEVEL, OUTLIERS, MISSING, EXACT, SIDES = 0, 1, 2, 3, 4
+LEVEL, OUTLIERS, MISSING, EXACT, SIDES, SUMS = 0, 1, 2, 3, 4, 5
 KIND = {b"BLCK": 16, b"LEAF": 17, b"META": 18, b"ROOT": 19, b"STRT": 20, b"WNDW": 21, b"WEND": 22, b"DESC": 23}
 
 # The totals of no blocks: reached, share, squared_error, min, max, then counts.
@@ -507,8 +507,8 @@ def plain_sum(values) -> float:
     return total
 
 
-def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, listed: bool, sided: bool) -> None:
-    """Sections 5 and 9: an entry by itself and with the block's geometry. `listed`: blocks may list their values; `sided`: have sides."""
+def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, announced: set) -> None:
+    """Sections 5 and 9: an entry by itself and with the block's geometry. `announced`: the kinds and levels that need a feature."""
     place = b.place
     need(b.lost <= 1, place, "lost is neither 0 nor 1")
     need(finite(b.step, b.reached) and b.reached >= 0, place, "step or error is not finite")
@@ -527,15 +527,15 @@ def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, l
     need(all(k < l for k, l in zip(keys, keys[1:])), place, "parts do not ascend")
     need(not b.exact or all(p.kind in (MISSING, EXACT) for p in b.parts), place, "exact beside levels or outliers")
     need(sum(p.kind == EXACT for p in b.parts) <= 1, place, "two exact parts")
-    need(listed or (EXACT, 1) not in keys, place, "listed values are not announced")
-    need(sided or (SIDES, 0) not in keys, place, "sides are not announced")
+    for key in ((EXACT, 1), (SIDES, 0), (SUMS, 0)):
+        need(key in announced or key not in keys, place, f"parts of kind {key[0]}, level {key[1]} are not announced")
     for p in b.parts:
         check_part(p, w, b.tier, size, sample_bytes, f"{place}, part of kind {p.kind}, level {p.level}")
 
 
 def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: str) -> None:
     need(p.reserved == p.reserved_too == 0, place, "reserved bytes are not zero")
-    need(p.kind <= SIDES, place, "there is no such kind")
+    need(p.kind <= SUMS, place, "there is no such kind")
     need(p.level < {LEVEL: w.level_parts, EXACT: 2}.get(p.kind, 1), place, "there is no such level")
     need(p.count >= 1, place, "count is 0")
     need(p.energy >= 0 and finite(p.largest) and p.largest >= 0, place, "bad energy or largest amount")
@@ -557,6 +557,9 @@ def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: st
     elif p.kind == SIDES:
         most = MAX_SIDES * samples
         fits = p.raw <= MAX_SIDES * (13 + 3 * samples + 8)
+    elif p.kind == SUMS:
+        most = w.frames
+        fits = p.raw <= 8 + 8 * w.frames + 5 * samples
     elif p.level == 1:
         cells = math.prod(cells_of((*size, w.frames)))
         longest = 8 + s * min(MAX_LISTED, samples) + lattice_most(cells, samples)
@@ -655,6 +658,34 @@ def read_sides(data: bytes, samples: int, place: str) -> list[tuple[int, float, 
             found.append((0, 0.0, b""))
     need(found, place, "no values")
     return found
+
+
+def add_to_sums(out: np.ndarray, data: bytes, p, frames: int, place: str) -> np.ndarray:
+    """Shifts the samples [frame * voxels + voxel] of each frame so that their sum is kept."""
+    need(len(data) >= 8 + 8 * frames, place, "ends within the codes")
+    unit, n = struct.unpack("<d", data[:8])[0], len(out) // frames
+    need(finite(unit) and unit > 0, place, "bad unit")
+    unsigned = [int(code) for code in planes(data[8 : 8 + 8 * frames], "<u8", frames)]
+    codes = [code >> 1 ^ -(code & 1) for code in unsigned]
+    need(all(abs(code) <= 2**53 for code in codes), place, "a code is too large")
+    need(sum(code != 0 for code in codes) == p.count, place, "wrong count")
+    r, unshifted, before = Record(data, place), [], 0
+    r.at = 8 + 8 * frames
+    while r.at < len(data):
+        unshifted.append(before + take_number(r))
+        before = unshifted[-1] + 1
+    need(before <= len(out), place, "a sample is not in the block")
+    old, out = out, out.reshape(frames, n).copy()
+    stride = next(m for m in range(n * 618 // 1000 + 1, 2 * n + 2) if math.gcd(m, n) == 1)
+    rank = np.arange(n) * stride % n
+    for frame, code in enumerate(codes):
+        if code and out.dtype.kind == "f":
+            out[frame] = to_samples(out[frame].astype(np.float64) + code * unit, out.dtype, place)
+        elif code:
+            out[frame] = to_samples(out[frame].astype(np.float64) + (code // n + (rank < code % n)), out.dtype, place)
+    out = out.reshape(-1)
+    out[unshifted] = old[unshifted]
+    return out
 
 
 class Coder:
@@ -1329,13 +1360,14 @@ class Archive:
         need(xxhash.xxh3_64_intdigest(data[:120]) == head.checksum, "header", "wrong checksum", 120)
         if head.major != 1:
             raise Unsupported("header", f"version {head.major}", 8)
-        if head.required > 31:
+        if head.required > 63:
             words = head.needs.rstrip(b"\0").decode("utf-8", "replace")
             raise Unsupported("header", f"the file needs: {words}", 16)
         need(head.reserved == 0, "header", "reserved bytes are not zero", 12)
         self.id = head.id
-        features = [bool(head.required & bit) for bit in (1, 2, 4, 8, 16)]
-        self.nested, self.described, self.tiered, self.listed, self.sided = features
+        self.nested, self.described, self.tiered = [bool(head.required & bit) for bit in (1, 2, 4)]
+        parts = (8, (EXACT, 1)), (16, (SIDES, 0)), (32, (SUMS, 0))
+        self.announced = {key for bit, key in parts if head.required & bit}
 
     def _footer(self) -> None:
         """Checks the footer and the places of metadata and root."""
@@ -1454,7 +1486,7 @@ class Archive:
         for i, b in enumerate(blocks):
             key = (leaf.window, leaf.first_block + i, leaf.channel, leaf.tier)
             need(b.where == key, place, "blocks are not in order")
-            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize, self.listed, self.sided)
+            check_block(b, self.metadata.windows[b.window], self._size(b), self.metadata.dtype.itemsize, self.announced)
             part_at = at + FRAME.size + len(b.bytes)
             for p in b.parts:
                 need(p.offset == part_at, b.place, f"a part does not begin at byte {part_at}", p.offset)
@@ -1508,6 +1540,9 @@ class Archive:
                 c = self._coefficients(b, w, size, payloads)
                 need(np.isfinite(c).all(), b.place, "a coefficient is not finite")
                 out = to_samples(inverse(c, w), dtype, b.place).reshape(-1)
+                if (SUMS, 0) in payloads:
+                    p, data = payloads[SUMS, 0]
+                    out = add_to_sums(out, data, p, w.frames, f"{b.place}, part of kind {SUMS}")
                 if self.metadata.keeps_range and w.min <= w.max:
                     out = np.clip(out, dtype.type(w.min), dtype.type(w.max))
         fixed = np.zeros(count, bool)

@@ -87,7 +87,7 @@ fn missed(c: &Comparison) -> Option<String> {
         return Some(format!("{outside} series outside the bound; the worst{place} is {share:.4} times the bound"));
     }
     if let Some(place) = c.first_not_kept {
-        return Some(format!("{} samples do not keep what the file keeps, the first at {place}", c.not_kept));
+        return Some(format!("{} samples or sums do not keep what the file keeps, the first at {place}", c.not_kept));
     }
     let BlockPlace { window, block, channel } = c.first_beyond?;
     let channel = channel.map_or(String::new(), |channel| format!(", {channel}"));

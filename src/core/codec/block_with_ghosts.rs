@@ -180,7 +180,7 @@ mod tests {
     const FRAMES: usize = 3;
 
     fn codec() -> WindowCodec {
-        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
+        let bound = ErrorBound::new(Bound::Pointwise, 0.1, 0.1);
         WindowCodec::new(Scheme::along_time(Basis::Samples), FRAMES, SampleType::F32, bound, 8)
     }
 

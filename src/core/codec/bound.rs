@@ -31,6 +31,7 @@
 //! allowed error. The share of a series is the largest, or the root mean square, of its samples' shares. A bound holds
 //! if all shares are at most 1.
 
+pub use super::limits::SampleLimits;
 pub use wavesplat_format::Bound;
 
 use crate::base::half::Half;
@@ -49,6 +50,7 @@ fn difference(x: f64, y: f64) -> (f64, f64) {
 pub fn difference_up(x: f64, y: f64) -> f64 {
     match difference(x, y) {
         (d, 0.0) => d.abs(),
+        (d, lost) if lost.is_finite() && (d > 0.0) != (lost > 0.0) => d.abs(), // rounded away from 0
         (d, lost) if lost.is_finite() => d.abs().next_up(),
         _ => f64::NAN,
     }
@@ -98,6 +100,19 @@ pub struct ErrorBound {
     pub tolerance: f64,
     /// The largest error allowed to any sample, or root mean square error allowed to any series; 0 means bit-exact.
     pub delta: f64,
+    /// What else limits the errors of single samples.
+    limits: Option<SampleLimits>,
+}
+
+/// The form of the error that is allowed to samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    /// The same error for every sample.
+    Same,
+    /// An error for each sample.
+    Varying,
+    /// A mean over a series.
+    Mean,
 }
 
 /// How the share of a series follows from the shares of its samples.
@@ -110,21 +125,74 @@ pub enum Measure {
 }
 
 impl ErrorBound {
+    /// A bound without other limits.
+    pub fn new(bound: Bound, tolerance: f64, delta: f64) -> Self {
+        Self { bound, tolerance, delta, limits: None }
+    }
+
+    /// The bound with limits of single samples. Where a mean has limits, no error of a sample exceeds delta.
+    pub fn within(self, limits: Option<SampleLimits>) -> Self {
+        let largest = limits.map_or(f64::INFINITY, |limits| limits.largest);
+        Self { limits, delta: self.delta.min(largest), ..self }
+    }
+
+    fn form(&self) -> Form {
+        match (self.bound, self.limits) {
+            (Bound::Relative { .. }, _) | (_, Some(SampleLimits { relative: Some(_), .. })) => Form::Varying,
+            (Bound::Rms | Bound::Sampled { .. }, None) => Form::Mean,
+            _ => Form::Same,
+        }
+    }
+
+    /// Whether delta is allowed to every sample.
+    pub fn is_same(&self) -> bool {
+        self.form() == Form::Same
+    }
+
+    /// Whether the error that is allowed to a sample depends on it.
+    pub(super) fn is_varying(&self) -> bool {
+        self.form() == Form::Varying
+    }
+
+    /// The least magnitude to which a share applies; 0 if none does.
+    pub(super) fn floor(&self) -> f64 {
+        match (self.bound, self.limits.and_then(|limits| limits.relative)) {
+            (Bound::Relative { floor }, Some(limit)) => floor.min(limit.floor),
+            (Bound::Relative { floor }, None) => floor,
+            (_, limit) => limit.map_or(0.0, |limit| limit.floor),
+        }
+    }
+
     /// How the share of a series follows from the shares of its samples.
     pub fn measure(&self) -> Measure {
-        match self.bound {
-            Bound::Pointwise | Bound::Relative { .. } => Measure::Largest,
-            Bound::Rms | Bound::Sampled { .. } => Measure::RootMeanSquare,
-        }
+        if self.form() == Form::Mean { Measure::RootMeanSquare } else { Measure::Largest }
     }
 
     /// The error allowed to a sample of this value, rounded down. For a bound of the mean, the allowed root mean
     /// square.
     pub fn allowed(&self, value: f64) -> f64 {
-        match self.bound {
+        let of_bound = match self.bound {
             Bound::Relative { floor } => relative_bound(self.tolerance, floor, value),
             _ => self.delta,
-        }
+        };
+        let Some(limits) = self.limits else { return of_bound };
+        let of_share = limits.share_at(value).map_or(f64::INFINITY, |share| relative_bound(share, 0.0, value));
+        of_bound.min(of_share).min(limits.largest)
+    }
+
+    /// As [`Self::allowed`], without directed rounding; 0 if it may underflow.
+    #[inline(always)]
+    fn about_allowed(&self, value: f64) -> f64 {
+        let of_bound = match self.bound {
+            Bound::Relative { floor } => self.tolerance * if value.abs() > floor { value.abs() } else { floor },
+            _ => self.delta,
+        };
+        let (share, largest) =
+            self.limits.map_or((None, f64::INFINITY), |limits| (limits.share_at(value), limits.largest));
+        let of_share = share.map_or(f64::INFINITY, |share| share * value.abs());
+        let of_limits = if of_share < largest { of_share } else { largest };
+        let allowed = if of_limits < of_bound { of_limits } else { of_bound };
+        if allowed < UNDERFLOW { 0.0 } else { allowed }
     }
 
     /// Whether the errors of one series are within the bound (eq 21-23). For each sample that is not missing: the error,
@@ -164,13 +232,11 @@ impl ErrorBound {
     /// This is vector code without directed rounding.
     pub(crate) fn add<const N: usize>(&self, errors: &[f64; N], values: &[f64; N], sums: &mut [f64; N]) {
         for ((sum, e), value) in sums.iter_mut().zip(errors).zip(values) {
-            match self.bound {
-                Bound::Pointwise => *sum = if *e > *sum { *e } else { *sum },
-                Bound::Rms | Bound::Sampled { .. } => *sum += e * e,
-                Bound::Relative { floor } => {
-                    let magnitude = if value.abs() > floor { value.abs() } else { floor };
-                    let allowed = self.tolerance * magnitude;
-                    let allowed = if allowed < UNDERFLOW { 0.0 } else { allowed };
+            match self.form() {
+                Form::Same => *sum = if *e > *sum { *e } else { *sum },
+                Form::Mean => *sum += e * e,
+                Form::Varying => {
+                    let allowed = self.about_allowed(*value);
                     let share = if *e > 0.0 { e / allowed } else { 0.0 };
                     *sum = if share > *sum { share } else { *sum };
                 }
@@ -182,13 +248,13 @@ impl ErrorBound {
     /// [`Self::add`].
     pub(crate) fn largest_share<const N: usize>(&self, sums: &[f64; N], frames: usize) -> f64 {
         let largest = sums.iter().copied().fold(0.0, f64::max);
-        match self.bound {
-            Bound::Pointwise if largest > 0.0 => share(largest.next_up(), self.delta),
-            Bound::Relative { .. } if largest > 0.0 => (largest * UP).next_up(),
-            Bound::Pointwise | Bound::Relative { .. } => 0.0,
-            Bound::Rms | Bound::Sampled { .. } if !(1e-140..1e140).contains(&self.delta) => f64::INFINITY, // squares would overflow or underflow
-            Bound::Rms | Bound::Sampled { .. } if largest == 0.0 => 0.0,
-            Bound::Rms | Bound::Sampled { .. } => {
+        match self.form() {
+            Form::Same if largest > 0.0 => share(largest.next_up(), self.delta),
+            Form::Varying if largest > 0.0 => (largest * UP).next_up(),
+            Form::Same | Form::Varying => 0.0,
+            Form::Mean if !(1e-140..1e140).contains(&self.delta) => f64::INFINITY, // squares would overflow or underflow
+            Form::Mean if largest == 0.0 => 0.0,
+            Form::Mean => {
                 let mean = largest / frames as f64 / (self.delta * self.delta);
                 (mean * UP + 1e-40).sqrt() // an error whose square underflowed was below 1e-20 of delta
             }
@@ -231,6 +297,7 @@ pub(crate) fn before_rounding(ty: SampleType, delta: f64, magnitude: f64) -> f64
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use wavesplat_format::Keep;
 
     #[test]
     fn exact_differences_are_not_rounded() {
@@ -243,7 +310,23 @@ mod tests {
     #[test]
     fn inexact_differences_are_rounded_up() {
         assert_eq!(difference_up(1.0, -1e-20), 1f64.next_up());
-        assert_eq!(difference_up(1.0, 1e-20), 1f64.next_up());
+        assert_eq!(difference_up(1.0, 1e-20), 1.0);
+        assert_eq!(difference_up(-1.0, -1e-20), 1.0);
+        assert_eq!(difference_up(-1.0, 1e-20), 1f64.next_up());
+    }
+
+    #[test]
+    fn limits_hold_beside_every_bound() {
+        let keep = Keep::parse("relative=0.5@4 difference=6").expect("words");
+        let limits = SampleLimits::new(&keep, [1; 3], [1.0; 3]);
+        for bound in [Bound::Pointwise, Bound::Rms, Bound::Relative { floor: 8.0 }] {
+            let bound = ErrorBound::new(bound, 2.0, 100.0).within(limits);
+            assert_eq!(bound.measure(), Measure::Largest);
+            let samples = [0.0, 3.9, 4.0, -5.0, 100.0, -4.5];
+            assert_eq!(samples.map(|v| bound.allowed(v).next_up()), samples.map(|v| bound.about_allowed(v).next_up()));
+            let is_close = |(v, expected): (f64, f64)| (bound.allowed(v) / expected - 1.0).abs() < 1e-14;
+            assert!(samples.into_iter().zip([3.0, 3.0, 2.0, 2.5, 3.0, 2.25]).all(is_close), "{bound:?}");
+        }
     }
 
     #[test]
@@ -260,14 +343,14 @@ mod tests {
     #[test]
     fn errors_of_just_delta_keep_the_root_mean_square() {
         for delta in [0.0, 5e-324, 1e-200, 0.1, 4.0, f64::MAX] {
-            let bound = ErrorBound { bound: Bound::Rms, tolerance: 0.1, delta };
+            let bound = ErrorBound::new(Bound::Rms, 0.1, delta);
             assert!(bound.holds([(delta, delta); 3].into_iter()), "{delta}");
             assert!(!bound.holds([(delta.next_up(), delta); 3].into_iter()), "{delta}");
         }
     }
 
     fn relative(tolerance: f64, floor: f64) -> ErrorBound {
-        ErrorBound { bound: Bound::Relative { floor }, tolerance, delta: relative_bound(tolerance, floor, -8.0) }
+        ErrorBound::new(Bound::Relative { floor }, tolerance, relative_bound(tolerance, floor, -8.0))
     }
 
     #[test]
@@ -321,7 +404,7 @@ mod tests {
             values in proptest::collection::vec((-1e3..1e3, 0.0..30.0), 1..40), kind in 0..3_usize, floor in 0.0..10.0,
         ) {
             let bound = [Bound::Pointwise, Bound::Rms, Bound::Relative { floor }][kind];
-            let bound = ErrorBound { bound, tolerance: 0.02, delta: 20.0 };
+            let bound = ErrorBound::new(bound, 0.02, 20.0);
             let mut sums = [0.0];
             values.iter().for_each(|(v, e)| bound.add(&[*e], &[*v], &mut sums));
             let fast = bound.largest_share(&sums, values.len());

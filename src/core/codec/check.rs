@@ -5,7 +5,7 @@ use super::box_samples::BoxSamples;
 use super::load::Missing;
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
-use crate::codec::bound::{Bound, Measure, share};
+use crate::codec::bound::{Measure, share};
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::Outliers;
 
@@ -62,6 +62,15 @@ pub(super) struct Ranges {
     pub(super) squares: f64,
 }
 
+/// What the samples of a row show.
+pub(super) struct RowStats {
+    pub(super) min: f64,
+    pub(super) max: f64,
+    /// The largest error, not rounded up; not a number if one is none.
+    pub(super) largest: f64,
+    pub(super) squares: f64,
+}
+
 impl Tally {
     pub(super) fn new() -> Self {
         let (min, max) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -114,7 +123,7 @@ impl Tally {
         whole: bool,
         index: impl Fn(usize, usize) -> Option<usize>,
     ) {
-        if whole && codec.bound.bound == Bound::Pointwise {
+        if whole && codec.bound.is_same() {
             return self.add_by_sample(codec, compared, count, index);
         }
         let clear = if whole { self.add_clearly_within(codec, compared, count) } else { [false; LANES] };
@@ -122,8 +131,8 @@ impl Tally {
         unclear.for_each(|lane| self.add_one(codec, compared, lane, |t| index(t, lane)));
     }
 
-    /// Adds `count` series without missing samples under [`Bound::Pointwise`]. Vector code adds samples that are clearly within the
-    /// bound, and rounds their errors up once at the end.
+    /// Adds `count` series without missing samples under a bound that is the same for all samples. Vector code adds samples that are clearly
+    /// within it, and rounds their errors up once at the end.
     fn add_by_sample(
         &mut self,
         codec: &WindowCodec,
@@ -201,7 +210,7 @@ impl Tally {
     }
 
     /// Adds the share of samples that are within the bound: rounding up may exceed 1.
-    fn add_share(&mut self, share: f64) {
+    pub(super) fn add_share(&mut self, share: f64) {
         self.share = self.share.max(share.min(1.0));
     }
 
@@ -215,6 +224,22 @@ impl Tally {
             self.outliers.push(index as u32);
         }
         is_within
+    }
+
+    /// Adds a row of samples that are within the bound, which is the same for all.
+    pub(super) fn add_row(&mut self, row: &RowStats, delta: f64) {
+        let largest = if row.largest > 0.0 { row.largest.next_up() } else { 0.0 };
+        self.reached = self.reached.max(largest);
+        self.share = self.share.max(share(largest, delta));
+        self.squared_error += row.squares;
+        (self.min, self.max) = (self.min.min(row.min), self.max.max(row.max));
+    }
+
+    /// The tally of samples that changed since `splatted` compared them; what is splatted is as before.
+    pub(super) fn with_splatted(self, splatted: &Self) -> Self {
+        let (min, max) = (self.min.min(splatted.min), self.max.max(splatted.max));
+        let (reached, share) = (self.reached.max(splatted.reached), self.share.max(splatted.share));
+        Self { min, max, reached, share, ..self }
     }
 
     /// Takes the samples that must be stored exactly.
@@ -250,7 +275,8 @@ struct LaneStats {
 }
 
 impl LaneStats {
-    /// Those of the samples that are clearly within [`Bound::Pointwise`]. Others make [`Self::missing`] and their element of `unclear` NaN.
+    /// Those of the samples that are clearly within a bound that is the same for all. Others make [`Self::missing`] and their element of
+    /// `unclear` NaN.
     fn of_clear_samples(codec: &WindowCodec, compared: &Compared<'_>, unclear: &mut [Lane]) -> Self {
         let mut stats = Self::empty();
         let error = codec.bound.delta.next_down().next_down();
@@ -349,7 +375,7 @@ fn compare_doubles(stats: &mut LaneStats, compared: &Compared<'_>, limits: Limit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::codec::bound::ErrorBound;
+    use crate::codec::bound::{Bound, ErrorBound};
     use crate::codec::scheme::Scheme;
     use crate::wavelet::Basis;
 
@@ -360,7 +386,7 @@ mod tests {
         let mut bytes = vec![0; values.len() * 4];
         sample::store(SampleType::F32, &values, &mut bytes);
         for (bound, delta) in [(Bound::Pointwise, 1.5), (Bound::Relative { floor: 3.0 }, 1.5)] {
-            let bound = ErrorBound { bound, tolerance: 0.5, delta };
+            let bound = ErrorBound::new(bound, 0.5, delta);
             let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, SampleType::F32, bound, 8);
             for declared in [None, Some(f64::from(values[40] as f32))] {
                 codec.missing_value = declared;
@@ -396,7 +422,7 @@ mod tests {
             *v += errors[i % 61 % 6] * if i % 3 == 0 { -1.0 } else { 1.0 };
         }
         (decoded[3][1], decoded[9][4], decoded[20][6]) = (f64::NAN, -9.5, f64::INFINITY);
-        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta };
+        let bound = ErrorBound::new(Bound::Pointwise, 0.1, delta);
         for (ty, count) in [(SampleType::F32, LANES), (SampleType::F64, 7), (SampleType::I16, LANES)] {
             let mut codec = WindowCodec::new(Scheme::along_time(Basis::Samples), frames, ty, bound, 8);
             codec.missing_value = Some(-9.5);

@@ -9,11 +9,14 @@ use super::buffer::Buffer;
 use super::codes::Codes;
 use super::field::{Above, Field, LONG_RUN, Plane, RUN, Stored};
 use super::rows::Change;
+use super::shifts::{FrameRun, add_shifts};
 use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
 use std::ops::Range;
-use wavesplat_format::{Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, SideCodes, Storage};
+use wavesplat_format::{
+    Axis, Basis, BlockEntry, Outliers, PartEntry, PartKind, Reader, Result, SideCodes, Storage, SumCodes,
+};
 
 /// One block in memory, decompressed but not yet transformed.
 #[derive(Debug)]
@@ -38,6 +41,8 @@ pub struct Block {
     pub exact: Option<Vec<u8>>,
     /// How samples get to their sides of each value that the file keeps; empty if all are there.
     pub sides: Vec<SideCodes>,
+    /// What keeps the sums of frames; none if decoded samples have them.
+    pub sums: Option<SumCodes>,
     /// The number of stored bytes read.
     pub bytes_read: u64,
 }
@@ -87,6 +92,7 @@ impl Block {
             missing: reader.missing(entry)?.unwrap_or_default(),
             exact: reader.exact(entry)?,
             sides: Self::read_sides(reader, codec, entry)?,
+            sums: if codec.lod == 0 { reader.sums(entry)? } else { None },
             bytes_read: 0,
         };
         block.thin_samples(codec);
@@ -106,6 +112,7 @@ impl Block {
             PartKind::Level(_) if decodes_sides => true,
             PartKind::Level(level) => codec.needs_part(level.into(), wanted),
             PartKind::Sides => decodes_sides,
+            PartKind::Sums => codec.lod == 0,
             _ => true,
         })
     }
@@ -137,6 +144,7 @@ impl Block {
             missing,
             exact: None,
             sides: Vec::new(),
+            sums: None,
             bytes_read: 0,
         }
     }
@@ -287,7 +295,9 @@ impl Block {
         let exact = self.exact.as_ref().map_or(0, Vec::len);
         let above = self.above.as_ref().map_or(0, Above::held_bytes);
         let sides: usize = self.sides.iter().map(|codes| codes.bits.len() + size_of::<SideCodes>()).sum();
-        above + self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact + sides
+        let sums =
+            self.sums.as_ref().map_or(0, |sums| size_of_val(&sums.frames[..]) + size_of_val(&sums.unshifted[..]));
+        above + sums + self.codes.held_bytes() + size_of_val(&self.outliers.positions[..]) + overrides + exact + sides
     }
 
     /// Whether all coefficients are zero.
@@ -388,7 +398,8 @@ impl Block {
         if !self.sides.is_empty() {
             return self.decode(codec, &WantedFrames::all(codec), |_, _| {}); // sides depend on the samples before
         }
-        if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && self.exact.is_none() {
+        let is_plain = self.exact.is_none() && self.sums.is_none();
+        if (codec.sample, codec.scheme.basis) == (SampleType::F32, Basis::Samples) && is_plain {
             let field = self.field_of(codec, wanted);
             if field.is_single() {
                 return self.stored_singles(codec, &field, &wanted.frames);
@@ -439,7 +450,7 @@ impl Block {
             None => {
                 self.for_each_run(codec, wanted, |at, values| {
                     visit(at, values);
-                    sample::store(codec.sample, values, &mut out[at * size..(at + values.len()) * size]);
+                    self.store(codec, at, values, &mut out[at * size..(at + values.len()) * size]);
                 });
                 self.clip(codec, &wanted.frames, &mut out);
             }
@@ -447,6 +458,14 @@ impl Block {
         self.put_overrides(size, &mut out);
         self.put_on_sides(codec, &mut out);
         out
+    }
+
+    /// Stores some voxels' samples of a frame, from the sample `at` on, so that sums are kept.
+    pub(super) fn store(&self, codec: &WindowCodec, at: usize, values: &[f64], out: &mut [u8]) {
+        sample::store(codec.sample, values, out);
+        if let Some(sums) = &self.sums {
+            add_shifts(codec.sample, sums, FrameRun::of(at, self.voxels), out);
+        }
     }
 
     /// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.

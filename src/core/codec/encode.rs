@@ -21,16 +21,16 @@ use super::field::{Above, Field, Stored};
 use super::group::Group;
 use super::listed::may_be_smaller;
 use super::load::{Missing, Source, load_group};
+use super::mend::Mended;
 use super::refine::Coded;
 use super::rows::count_nonzero;
-use super::sides::CodedSides;
 use super::truncate::Truncation;
 use super::{WindowCodec, lane_groups};
 use crate::base::sample::join_ranges;
 use crate::base::vectors::dispatch;
 use crate::wavelet::{LANES, Lane};
 use wavesplat_format::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, Listed, PartKind, PartStats};
-use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers, pack_sides};
+use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers, pack_sides, pack_sums};
 
 /// The encoder of one worker.
 #[derive(Debug)]
@@ -84,24 +84,30 @@ impl Encoder {
                 block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut double, &mut self.codes)
             }
         };
-        if codec.sides.is_empty() {
-            (single, double) = (Buffer::default(), Buffer::default()); // packing takes memory
-        }
+        let mut coded = coded;
+        let mended = match &mut coded {
+            Some(of) if codec.mends() => {
+                let field = match &codec.scheme.pyramid {
+                    _ if of.step == 0.0 => Field::zero(codec),
+                    None => Field::scaled(codec, of.step, &self.codes),
+                    Some(pyramid) if pyramid.single => Field::single(single, of.marked.clone()),
+                    Some(_) => Field::double(double, of.marked.clone()),
+                };
+                block.mend(of, &field)
+            }
+            _ => {
+                drop((single, double)); // packing takes memory
+                Some(Mended::default())
+            }
+        };
+        let (coded, mended) = mended.map_or((None, Mended::default()), |mended| (coded, mended));
         let parts = match &coded {
             Some(coded) => self.coded_parts(codec, size, coded)?,
             None => self.exact_parts(codec, samples, &missing, None)?,
         };
         let mut parts = self.smaller(codec, samples, &missing, parts)?;
-        if let Some(coded) = coded.filter(|_| !codec.sides.is_empty() && !parts.are_exact()) {
-            let field = match &codec.scheme.pyramid {
-                _ if coded.step == 0.0 => Field::zero(codec),
-                None => Field::scaled(codec, coded.step, &self.codes),
-                Some(pyramid) if pyramid.single => Field::single(single, coded.marked),
-                Some(_) => Field::double(double, coded.marked),
-            };
-            if let Some(sides) = block.sides(parts.stats.reached, &coded.outliers, &field) {
-                parts.add_sides(&mut self.compressor, &sides, clear(&mut self.raw))?;
-            }
+        if !parts.are_exact() {
+            parts.add(&mut self.compressor, &mended, &mut self.raw)?;
         }
         let Parts { stats, share, mut parts } = parts;
         if missing.count > 0 {
@@ -319,17 +325,18 @@ impl Parts {
         self.parts.iter().any(|part| part.kind.is_exact())
     }
 
-    /// Adds how samples get to their sides.
-    fn add_sides(
-        &mut self,
-        compressor: &mut Compressor,
-        sides: &CodedSides,
-        raw: &mut Vec<u8>,
-    ) -> wavesplat_format::Result<()> {
-        pack_sides(&sides.codes, raw);
-        let stats = PartStats { count: sides.count, energy: 0.0, largest: 0.0 };
-        self.parts.push(compressor.part(PartKind::Sides, stats, raw)?);
-        (self.stats.min, self.stats.max) = join_ranges((self.stats.min, self.stats.max), sides.range);
+    /// Adds what moves samples to what the file keeps.
+    fn add(&mut self, compressor: &mut Compressor, mended: &Mended, raw: &mut Vec<u8>) -> wavesplat_format::Result<()> {
+        let stats = |count: u64| PartStats { count, energy: 0.0, largest: 0.0 };
+        if let Some(sides) = &mended.sides {
+            pack_sides(&sides.codes, clear(raw));
+            self.parts.push(compressor.part(PartKind::Sides, stats(sides.count), raw)?);
+            (self.stats.min, self.stats.max) = join_ranges((self.stats.min, self.stats.max), sides.range);
+        }
+        if let Some(sums) = &mended.sums {
+            pack_sums(sums, clear(raw));
+            self.parts.push(compressor.part(PartKind::Sums, stats(sums.count()), raw)?);
+        }
         Ok(())
     }
 

@@ -10,7 +10,7 @@
 use super::WindowCodec;
 use super::box_samples::BoxSamples;
 use crate::base::sample::SampleType;
-use crate::codec::bound::{self, Bound, ErrorBound};
+use crate::codec::bound::{self, ErrorBound};
 use crate::wavelet::{LANES, Lane};
 
 /// The error weights and the quantisation step of a block.
@@ -31,9 +31,11 @@ impl QuantizerSetup {
     /// The setup for a block whose largest sample is `magnitude`. None if no error is allowed, so that the block must
     /// be stored exactly.
     pub(super) fn new(codec: &WindowCodec, samples: &BoxSamples<'_>, magnitude: f64) -> Option<Self> {
-        let found = match codec.bound.bound {
-            Bound::Relative { floor } => Self::relative(codec, magnitude, floor.max(usual_magnitude(codec, samples))),
-            _ => Self::same(codec, magnitude),
+        let found = if codec.bound.is_varying() {
+            let least = codec.bound.floor().max(usual_magnitude(codec, samples));
+            Self::varying(codec, magnitude, least.min(magnitude))
+        } else {
+            Self::same(codec, magnitude)
         };
         (codec.bound.delta > 0.0 && found.step.is_normal()).then_some(found)
     }
@@ -45,9 +47,9 @@ impl QuantizerSetup {
         Self { bound: codec.bound, sample: codec.sample, floor: 0.0, common: Some(reciprocal(error)), step }
     }
 
-    /// The setup for a relative bound. The step suits all but the smallest samples, if 32-bit codes of the
+    /// The setup for a bound that varies with the samples. The step suits all but the smallest samples, if 32-bit codes of the
     /// largest permit.
-    fn relative(codec: &WindowCodec, magnitude: f64, floor: f64) -> Self {
+    fn varying(codec: &WindowCodec, magnitude: f64, floor: f64) -> Self {
         let mut found = Self { bound: codec.bound, sample: codec.sample, floor, common: None, step: 1.0 };
         let smallest = found.error(0.0);
         if smallest > 0.0 {
@@ -69,10 +71,10 @@ impl QuantizerSetup {
         self.common.map_or_else(|| samples.map(|v| reciprocal(self.error(v))), |w| [w; LANES])
     }
 
-    /// The error allowed to a sample under a relative bound before rounding to the sample type; 0 or less if none.
+    /// The error allowed to a sample under a bound that varies before rounding to the sample type; 0 or less if none.
     fn error(&self, value: f64) -> f64 {
         let magnitude = value.abs().max(self.floor);
-        bound::before_rounding(self.sample, self.bound.tolerance * magnitude, magnitude)
+        bound::before_rounding(self.sample, self.bound.allowed(magnitude), magnitude)
     }
 }
 

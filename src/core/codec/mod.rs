@@ -5,6 +5,8 @@
 //! it, except for series that cannot change a block's statistics (`screen`). Nothing here depends on the kind of transform along time, except that samples without one
 //! (`Basis::Samples`) may also be predicted along time.
 
+mod as_read;
+mod balance;
 pub mod bound;
 mod box_samples;
 pub mod buffer;
@@ -18,8 +20,10 @@ pub mod field;
 mod forward;
 mod gain;
 mod group;
+mod limits;
 mod listed;
 mod load;
+mod mend;
 mod moved;
 mod order;
 pub mod part;
@@ -31,13 +35,14 @@ mod rows;
 pub mod block_with_ghosts;
 pub mod scheme;
 mod screen;
+pub mod shifts;
 mod sides;
 pub mod trial;
 mod truncate;
 
 use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
-use crate::codec::bound::{ErrorBound, difference_up};
+use crate::codec::bound::{ErrorBound, SampleLimits, difference_up};
 use crate::wavelet::{self, LANES, TimeBasis};
 use buffer::Buffer;
 pub use load::load_lanes;
@@ -95,6 +100,8 @@ pub struct WindowCodec {
     pub clip: Option<(f64, f64)>,
     /// The kept values, ascending: samples stay below, at or above each.
     pub sides: Arc<[f64]>,
+    /// Whether the sums of each block's frames are kept.
+    pub sums: bool,
     /// Without a pyramid: the range of coefficients in each level part of a block, coarse to fine.
     pub levels: Vec<Range<usize>>,
     /// Whether blocks may list their values.
@@ -135,6 +142,7 @@ impl WindowCodec {
             missing_value: None,
             clip: None,
             sides: Arc::from([]),
+            sums: false,
             levels,
             lists: false,
             lod: 0,
@@ -152,11 +160,12 @@ impl WindowCodec {
             return Err(wavesplat_format::Error::Invalid(what));
         }
         let levels: Vec<usize> = window.levels.iter().map(|n| *n as usize).collect();
-        let bound = ErrorBound { bound: file.bound, tolerance: file.tolerance, delta: window.delta };
+        let (keep, dims) = (file.keep(), file.dims.map(|n| n as usize));
+        let limits = SampleLimits::new(&keep, dims, file.spacing);
+        let bound = ErrorBound::new(file.bound, file.tolerance, window.delta).within(limits);
         let codec = Self::with_levels(scheme, basis, file.sample, bound, &levels);
-        let keep = file.keep();
         let clip = Some((window.min, window.max)).filter(|(lo, hi)| lo <= hi && keep.range);
-        Ok(Self { missing_value: file.missing_value, clip, sides: keep.sides.into(), ..codec })
+        Ok(Self { missing_value: file.missing_value, clip, sides: keep.sides.into(), sums: keep.sum, ..codec })
     }
 
     /// The largest number of level parts of a block.

@@ -12,7 +12,7 @@ use wavesplat_format::{BlockEntry, PartKind};
 /// Whether [`Block::samples_of_part`] can decode the samples of a block: a pyramid gives its coefficients, and no sample is missing or
 /// stored exactly.
 pub fn is_divisible(codec: &WindowCodec, entry: &BlockEntry) -> bool {
-    let is_coded = |kind: PartKind| matches!(kind, PartKind::Level(_) | PartKind::Outliers);
+    let is_coded = |kind: PartKind| matches!(kind, PartKind::Level(_) | PartKind::Outliers | PartKind::Sums);
     codec.scheme.pyramid.is_some() && !entry.lost && entry.parts.iter().all(|part| is_coded(part.kind))
 }
 
@@ -30,7 +30,7 @@ impl Block {
         let mut out = vec![0; frames.len() * part.voxels() * size];
         self.for_each_run_in(codec, field, frames, rows(part, self.size), |at, values| {
             if let Some(to) = self.place(at, frames, part) {
-                sample::store(codec.sample, values, &mut out[to * size..(to + values.len()) * size]);
+                self.store(codec, at, values, &mut out[to * size..(to + values.len()) * size]);
             }
         });
         if let Some((lo, hi)) = codec.clip {

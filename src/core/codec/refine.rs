@@ -387,7 +387,7 @@ mod tests {
             let values: Vec<f64> = (0..frames * all).map(|i| smooth(i % all, i / all) + noise * number(i)).collect();
             let mut bytes = vec![0; values.len() * ty.size()];
             sample::store(ty, &values, &mut bytes);
-            let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 0.1 };
+            let bound = ErrorBound::new(Bound::Pointwise, 0.1, 0.1);
             for basis in [Basis::Learned, Basis::Samples] {
                 let functions = if basis == Basis::Learned { vec![20000; frames] } else { Vec::new() };
                 let mut codec =

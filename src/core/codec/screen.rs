@@ -11,7 +11,6 @@
 //! A series changes nothing if its errors plus slack are no larger than an exact error of the same block, and its samples with
 //! slack lie between exact samples of it. The sum of squared errors takes what 32-bit floats give.
 
-use super::bound::Bound;
 use super::box_samples::BoxSamples;
 use super::check::Ranges;
 use super::field::Used;
@@ -70,7 +69,7 @@ impl<'a> Screen<'a> {
     pub(super) fn applies<R: Real>(of: &Source<'_>) -> bool {
         let is_float = matches!(of.codec.sample, SampleType::F32 | SampleType::F64);
         let is_sum = of.codec.scheme.basis == Basis::Samples || of.codec.basis.rows().is_some();
-        let has_bound = of.codec.bound.bound == Bound::Pointwise && of.codec.bound.delta >= LEAST_DELTA;
+        let has_bound = of.codec.bound.is_same() && of.codec.bound.delta >= LEAST_DELTA;
         is_float && is_sum && has_bound && of.missing.count == 0 && R::singles(&[]).is_some()
     }
 
@@ -195,7 +194,7 @@ mod tests {
     use super::*;
     use crate::base::sample;
     use crate::codec::WindowCodec;
-    use crate::codec::bound::ErrorBound;
+    use crate::codec::bound::{Bound, ErrorBound};
     use crate::codec::load::Missing;
     use crate::codec::scheme::Scheme;
     use crate::wavelet::{LANES, Lane};
@@ -211,7 +210,7 @@ mod tests {
             let ty = if is_double { SampleType::F64 } else { SampleType::F32 };
             let functions = if learned { (0..3 * frames).map(|i| (number(i) / 10.0_f64.powi(scale) * 9e3) as i16).collect() } else { Vec::new() };
             let basis = if learned { Basis::Learned } else { Basis::Samples };
-            let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.1, delta: 10.0_f64.powi(scale) };
+            let bound = ErrorBound::new(Bound::Pointwise, 0.1, 10.0_f64.powi(scale));
             let codec = WindowCodec::new(Scheme { functions, ..Scheme::along_time(basis) }, frames, ty, bound, 8);
             let k = codec.basis.coefficients();
             let values: Vec<f64> = (0..frames * voxels).map(|i| number(i + 77)).collect();

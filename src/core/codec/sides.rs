@@ -7,12 +7,14 @@
 //! the neighbours before it, which both coder and decoder know.
 
 use super::WindowCodec;
-use super::field::{Field, LONG_RUN, RUN};
+use super::field::Field;
 use super::load::Source;
+use super::refine::Coded;
+use super::shifts::{FrameRun, add_shifts, largest_shift, spacing};
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
 use std::ops::Range;
-use wavesplat_format::{Basis, BitDecoder, BitEncoder, Chance, Outliers, Side, SideCodes, SideSet};
+use wavesplat_format::{BitDecoder, BitEncoder, Chance, Side, SideCodes, SideSet, SumCodes};
 
 /// The samples on each side of a value that are nearest to it; none if the type has no such sample.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +34,29 @@ impl Nearest {
 
     fn on(&self, side: Side) -> Option<f64> {
         self.0[side as usize]
+    }
+}
+
+/// The kept values of a file, and the samples nearest to them.
+pub(super) struct SidesOf(Vec<(f64, Nearest)>);
+
+impl SidesOf {
+    /// Those of a codec.
+    pub(super) fn new(codec: &WindowCodec) -> Self {
+        let nearest = |value: &f64| (*value, Nearest::new(codec.sample, *value, codec.missing_value));
+        Self(codec.sides.iter().map(nearest).collect())
+    }
+
+    /// Moves decoded samples to the sides of the source's.
+    pub(super) fn place(&self, source: &[f64], decoded: &mut [f64]) {
+        for (value, nearest) in &self.0 {
+            for (sample, source) in decoded.iter_mut().zip(source) {
+                let side = Side::of(*source, *value);
+                if let Some(moved) = nearest.on(side).filter(|_| Side::of(*sample, *value) != side) {
+                    *sample = moved;
+                }
+            }
+        }
     }
 }
 
@@ -297,19 +322,32 @@ pub(super) struct CodedSides {
 }
 
 impl Source<'_> {
-    /// Codes how decoded samples get to their sides; none if all are there. `reached` is the largest error of a sample, and `field` has the
-    /// block's decoded coefficients.
-    pub(super) fn sides(&self, reached: f64, outliers: &Outliers, field: &Field<'_>) -> Option<CodedSides> {
-        let (codec, source) = (self.codec, self.samples.contiguous());
-        // A sample that changes is within `reached` of the value and of its source, so its source is within twice that. All others stay on
-        // their sides, so the source stands for them.
+    /// Codes how decoded samples get to their sides; none if all are there. `field` has the block's decoded coefficients, and `sums` what
+    /// keeps the sums of its frames.
+    pub(super) fn sides(&self, coded: &Coded, field: &Field<'_>, sums: Option<&SumCodes>) -> Option<CodedSides> {
+        let (codec, source, outliers) = (self.codec, self.samples.contiguous(), &coded.outliers);
+        // A sample that changes is as near to the value as to its source. So its source is within twice that. All others stay on their
+        // sides, so the source stands for them.
+        let reached = coded.tally.reached;
+        let reached = sums.map_or(reached, |sums| {
+            let shifted = reached + largest_shift(codec.sample, sums, self.voxels());
+            shifted + spacing(codec.sample, self.missing.magnitude + shifted)
+        });
         let near = self.near(&source, 2.0 * reached);
         if near.is_empty() {
             return None;
         }
-        let mut samples = source.to_vec();
-        self.decode_runs(field, &near, &mut samples);
-        let size = codec.sample.size();
+        let (mut samples, size, voxels) = (source.to_vec(), codec.sample.size(), self.voxels());
+        self.for_each_run(field, near.into_iter(), |first, values| {
+            let bytes = &mut samples[first * size..][..values.len() * size];
+            sample::store(codec.sample, values, bytes);
+            if let Some(sums) = sums {
+                add_shifts(codec.sample, sums, FrameRun::of(first, voxels), bytes);
+            }
+            if let Some((lo, hi)) = codec.clip {
+                sample::clip(codec.sample, lo, hi, bytes);
+            }
+        });
         let missing = if self.missing.count > 0 { self.missing.mask() } else { &[] };
         let are_missing = missing.iter().enumerate().filter(|(_, is_missing)| **is_missing).map(|(index, _)| index);
         let restored = outliers.positions.iter().map(|position| *position as usize).chain(are_missing);
@@ -331,7 +369,7 @@ impl Source<'_> {
     /// The runs of voxels in which a sample of any frame may be within `distance` of a kept value.
     fn near(&self, source: &[u8], distance: f64) -> Vec<Range<usize>> {
         let (codec, voxels) = (self.codec, self.voxels());
-        let run = if codec.scheme.basis == Basis::Samples { LONG_RUN } else { RUN };
+        let run = self.run();
         let (size, mut is_near) = (codec.sample.size(), vec![false; voxels.div_ceil(run)]);
         for frame in source.chunks_exact(voxels * size) {
             for (samples, is_near) in frame.chunks(run * size).zip(&mut is_near).filter(|(_, is_near)| !**is_near) {
@@ -341,24 +379,6 @@ impl Source<'_> {
         }
         let runs = is_near.into_iter().enumerate().filter(|(_, is_near)| *is_near);
         runs.map(|(at, _)| at * run..voxels.min((at + 1) * run)).collect()
-    }
-
-    /// Decodes the samples of all frames in some runs of voxels, as a reader does.
-    fn decode_runs(&self, field: &Field<'_>, runs: &[Range<usize>], samples: &mut [u8]) {
-        let (codec, voxels, size) = (self.codec, self.voxels(), self.codec.sample.size());
-        let (frames, runs) = ((0..codec.frames()).collect::<Vec<_>>(), runs.iter().cloned());
-        let store = |first: usize, values: &[f64]| {
-            let bytes = &mut samples[first * size..][..values.len() * size];
-            sample::store(codec.sample, values, bytes);
-            if let Some((lo, hi)) = codec.clip {
-                sample::clip(codec.sample, lo, hi, bytes);
-            }
-        };
-        if codec.scheme.basis == Basis::Samples {
-            field.for_each_run_of_samples(voxels, &frames, &runs, store);
-        } else {
-            field.for_each_run(codec.basis.as_ref(), voxels, &frames, runs, store);
-        }
     }
 }
 

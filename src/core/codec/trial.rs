@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn estimates_are_close_to_what_is_stored() {
         let (samples, xyzt) = (samples(), [Axis::X, Axis::Y, Axis::Z, Axis::T]);
-        let bound = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.01 };
+        let bound = ErrorBound::new(Bound::Pointwise, 0.01, 0.01);
         for (basis, coarseness, order) in [(Basis::Haar, 1.5, &xyzt[..3]), (Basis::Samples, 1.0, &xyzt[..])] {
             let (order, stencil) = (order.to_vec(), Stencil::Cubic);
             let pyramid = Pyramid {

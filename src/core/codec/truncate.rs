@@ -419,7 +419,7 @@ mod tests {
             for (bound, case) in
                 [(Bound::Pointwise, 0), (Bound::Rms, 0), (Bound::Relative { floor: 0.1 }, 1), (Bound::Rms, 1)]
             {
-                let bound = ErrorBound { bound, tolerance: 0.1, delta: 0.1 };
+                let bound = ErrorBound::new(bound, 0.1, 0.1);
                 let codec = WindowCodec::new(Scheme::along_time(basis), frames, SampleType::F64, bound, 8);
                 let step = bound.step(0.1, codec.gain);
                 let (mut group, mut truncation) = (Group::new(&codec), Truncation::new(&codec, step));

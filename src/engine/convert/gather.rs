@@ -11,10 +11,10 @@ use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
-use wavesplat_core::base::grid::Region;
+use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::base::sample::{self, SampleType, join_ranges};
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
-use wavesplat_core::codec::bound::{self, Bound, ErrorBound};
+use wavesplat_core::codec::bound::{self, Bound, ErrorBound, SampleLimits};
 use wavesplat_core::codec::buffer::Buffer;
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan};
@@ -116,6 +116,7 @@ impl<'a> WindowReader<'a> {
             tiered: plan.tiers > 0,
             listed: config.lists(),
             sided: !config.keep.sides.is_empty(),
+            summed: config.keep.sum,
         });
         let (id, range, scheme) = (done.id, None, None);
         Self {
@@ -226,7 +227,9 @@ impl<'a> WindowReader<'a> {
             coloured => coloured.iter().map(|channel| channel as _).collect(),
         };
         let delta = self.delta(&channels, of_window, range)?;
-        let promise = ErrorBound { bound: config.bound, tolerance: config.tolerance, delta };
+        let Grid { dims, spacing, .. } = self.archive.grid;
+        let limits = SampleLimits::new(&config.keep, dims, spacing);
+        let promise = ErrorBound::new(config.bound, config.tolerance, delta).within(limits);
         let magnitude = sample::magnitude(of_window);
         let goes_on = self.is_rough || !index.is_multiple_of(config.chain);
         let before = self.scheme.as_ref().filter(|scheme| goes_on && scheme.pyramid.is_some());
@@ -249,6 +252,7 @@ impl<'a> WindowReader<'a> {
         self.scheme = Some(Scheme::clone(&codec.scheme));
         codec.clip = Some(of_window).filter(|(lo, hi)| config.keep.range && lo <= hi);
         codec.sides = config.keep.sides.as_slice().into();
+        codec.sums = config.keep.sum;
         self.findings.range = self.findings.range.map_or(Some(of_window), |seen| Some(join_ranges(seen, of_window)));
         let id = self.id(scan.digest)?;
         let index =

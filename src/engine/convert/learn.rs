@@ -188,7 +188,7 @@ mod tests {
                 .flat_map(|c| [1.0, -2.0, 3.0].map(|v: f64| v * c * scale))
                 .flat_map(f64::to_le_bytes)
                 .collect();
-            let promise = ErrorBound { bound: Bound::Pointwise, tolerance: 0.01, delta: 0.1 * scale };
+            let promise = ErrorBound::new(Bound::Pointwise, 0.01, 0.1 * scale);
             let functions = learned_functions([&values[..]].into_iter(), SampleType::F64, 4, None, &promise);
             let ratio: Vec<f64> = functions.iter().map(|f| f64::from(*f) / f64::from(functions[0])).collect();
             assert_eq!(functions.len(), 4);

@@ -4,6 +4,7 @@ use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, settings, trial_boxes};
 use crate::file::above::{most_within, nodes_above};
 use crate::file::promise::UNIT_RANGE;
+use wavesplat_core::base::description::{coordinates, is_regular};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::{BlockGrid, Region};
 use wavesplat_core::base::memory;
@@ -13,7 +14,7 @@ use wavesplat_core::codec::bound::Bound;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
 use wavesplat_core::wavelet;
 use wavesplat_format::limits::MAX_TIERS;
-use wavesplat_format::{Basis, BlockId, Keep, Metadata};
+use wavesplat_format::{Basis, BlockId, Derivative, Keep, Metadata};
 
 /// Decisions made from the configuration and the archive before any frame is read.
 #[derive(Debug)]
@@ -194,12 +195,7 @@ fn tiers(blocks: BlockGrid) -> u8 {
 /// Checks that the tolerance or error is valid for this bound and these samples.
 fn check_bound(input: &CodedInput) -> Result<()> {
     let config = &input.config;
-    if Keep::parse(&config.keep.to_string()).as_ref() != Ok(&config.keep) {
-        return Err(Error::setting("keep", "takes up to 16 finite values that ascend"));
-    }
-    if input.colour_transform.is_some() && !config.keep.sides.is_empty() {
-        return Err(Error::setting("keep", "sides are those of samples, and `transfer_function` codes colours"));
-    }
+    check_keep(input)?;
     let Some(error) = config.max_error else {
         let is_share = (0.0..=1.0).contains(&config.tolerance);
         return is_share.then_some(()).ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
@@ -208,6 +204,29 @@ fn check_bound(input: &CodedInput) -> Result<()> {
         return Err(Error::setting("max_error", "takes a finite number of 0 or more, in the samples' unit"));
     }
     check_max_error(config.bound, config.range != Some(UNIT_RANGE), input.colour_transform.is_some())
+}
+
+/// Checks that what is kept means something for these samples.
+fn check_keep(input: &CodedInput) -> Result<()> {
+    let keep = &input.config.keep;
+    let wrong = |what: &str| Err(Error::setting("keep", what));
+    if Keep::parse(&keep.to_string()).as_ref() != Ok(keep) {
+        return wrong("takes up to 16 finite values that ascend, and errors and shares of 0 or more");
+    }
+    if input.colour_transform.is_some() && *keep != (Keep { range: keep.range, ..Keep::default() }) {
+        return wrong("takes only range, since `transfer_function` codes colours, and the others are about samples");
+    }
+    let in_space = keep.derivatives.iter().find(|of| of.derivative != Derivative::Difference);
+    let coordinates = |axis| coordinates(input.archive.description.as_ref()?, axis);
+    let is_uneven = |axis: &usize| coordinates(*axis).is_some_and(|at| !is_regular(&at));
+    match in_space.zip((0..3).find(is_uneven)) {
+        Some((of, axis)) => wrong(&format!(
+            "{} needs voxels at regular places, and those along {} are not; difference and relative do not need them",
+            of.derivative.name(),
+            ["x", "y", "z"][axis]
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Checks that an error in the samples' unit means something beside the other settings.
@@ -261,9 +280,10 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let choice = if has_pyramids { trial_boxes::bytes(samples, sample, each) } else { 0 };
     let workers = rayon::current_num_threads();
     let threads = |room: &Room| room.flight.min(workers);
-    let sided = if config.keep.sides.is_empty() { 0 } else { 2 * raw }; // samples of the source, and as decoded
+    let copies = if config.keep.sum { 3 } else { 2 * usize::from(!config.keep.sides.is_empty()) };
+    let mended = copies * raw + if config.keep.sum { samples + voxels * size_of::<f64>() } else { 0 };
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
-    let scratch = samples + 2 * codes + field + raw + channel_bytes + sided + begin + above + ZSTD_SCRATCH;
+    let scratch = samples + 2 * codes + field + raw + channel_bytes + mended + begin + above + ZSTD_SCRATCH;
     // The blocks above and two lists of blocks that wait; vectors grow to twice their length.
     let spool = if tiers > 0 { 3 * 2 * SPOOLED } else { 0 };
     let needs = |room: &Room| {

@@ -61,7 +61,9 @@ pub fn largest_bound(file: &Metadata) -> f64 {
 fn words(file: &Metadata) -> String {
     let (tolerance, (lo, hi)) = (file.tolerance, range_of_shares(file));
     let amount = |error: f64| unit(file).map_or(format!("{error:e}"), |unit| format!("{error:e} {unit}"));
-    let (absolute, largest) = (max_error(file).map(amount), amount(rounded(largest_bound(file))));
+    let largest = largest_bound(file);
+    let absolute = max_error(file).map(|error| amount(if largest < error { rounded(largest) } else { error }));
+    let largest = amount(rounded(largest));
     let of_range = || {
         let share = || format!("{tolerance:e} x range ({lo:.4e} to {hi:.4e}), at most {largest}");
         absolute.clone().unwrap_or_else(share)

@@ -8,9 +8,10 @@ use std::collections::BTreeSet;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::progress::Progress;
-use wavesplat_core::base::sample::join_ranges;
+use wavesplat_core::base::sample::{join_ranges, magnitude};
 use wavesplat_core::codec::bound;
 use wavesplat_core::codec::decode::Block;
+use wavesplat_core::codec::shifts::{ExactSum, allowed_sum};
 use wavesplat_core::codec::{WindowCodec, lane_groups, load_lanes};
 use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Lane;
@@ -79,9 +80,10 @@ pub struct Comparison {
     pub worst: Option<SampleLocation>,
     /// Series (of a voxel in a window) outside the bound.
     pub series_outside: u64,
-    /// Samples that do not keep what the file [keeps](wavesplat_format::Keep), and windows beyond the source's extremes.
+    /// Samples and sums of blocks' frames that do not keep what the file [keeps](wavesplat_format::Keep), and windows beyond the source's
+    /// extremes.
     pub not_kept: u64,
-    /// The first of them, or the beginning of the window.
+    /// The first of them, or the beginning of the block or window.
     pub first_not_kept: Option<SampleLocation>,
     /// Blocks with an error or a value beyond what the directory or the window's record states.
     pub blocks_beyond_stated: u64,
@@ -381,6 +383,7 @@ fn compare(
     let mut found = Comparison { samples: samples as u64, ..Comparison::default() };
     let (mut missing, mut range) = (0, (f64::INFINITY, f64::NEG_INFINITY));
     let (mut not_kept, mut first_not_kept, mut of_source) = (0, None, range);
+    let mut sums = vec![FrameSum::default(); codec.frames()];
     // The error of a sample, and what is allowed; none if it is missing in both.
     let mut compared = |i: usize, source: f64, extracted: f64| {
         if codec.is_missing(source) {
@@ -394,6 +397,7 @@ fn compare(
             first_not_kept = first_not_kept.or(Some(place(i / voxels, i % voxels)));
         }
         of_source = join_ranges(of_source, (source, source));
+        sums[i / voxels].add(extracted - source);
         Some((codec.error(splatted[i], extracted, source), codec.bound.allowed(source)))
     };
     let lanes = vec![Lane::default(); codec.frames()];
@@ -411,9 +415,34 @@ fn compare(
             add_series(codec, &errors, |frame| place(frame, voxel), &mut found);
         }
     }
+    for (frame, sum) in sums.iter().enumerate().filter(|_| codec.sums) {
+        if !sum.is_kept(codec, magnitude(of_source)) {
+            not_kept += 1;
+            first_not_kept = first_not_kept.or(Some(place(frame, 0)));
+        }
+    }
     found.missing = missing;
     (found.not_kept, found.first_not_kept, found.source) = (not_kept, first_not_kept, Some(of_source));
     (found, range)
+}
+
+/// The errors of the samples of a block in a frame.
+#[derive(Debug, Clone, Copy, Default)]
+struct FrameSum {
+    errors: ExactSum,
+    samples: usize,
+}
+
+impl FrameSum {
+    fn add(&mut self, error: f64) {
+        self.errors.add(error);
+        self.samples += 1;
+    }
+
+    /// Whether the sum of the samples is kept; the largest of the block has this magnitude.
+    fn is_kept(&self, codec: &WindowCodec, magnitude: f64) -> bool {
+        self.errors.total().abs() <= allowed_sum(codec.sample, magnitude, codec.bound.delta, self.samples)
+    }
 }
 
 /// The error of a sample in a frame of the window, and what is allowed.

@@ -59,7 +59,7 @@ fn damage_is_corrupt_and_names_the_place() {
 #[test]
 fn newer_files_are_unsupported() {
     let pieces = Pieces::new(&lean().file);
-    for (at, value) in [(8, 2), (8, 0), (16, 32), (23, 0x80)] {
+    for (at, value) in [(8, 2), (8, 0), (16, 64), (23, 0x80)] {
         let file = pieces.forge(&mut |piece, _, bytes| {
             if piece == Piece::Header {
                 bytes[at] = value;

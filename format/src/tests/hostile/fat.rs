@@ -168,7 +168,7 @@ fn fat_files_have_every_feature() {
         let has = |kind| blocks.values().any(|(entry, _)| of(&entry.id) && entry.part(kind).is_some());
         assert!(kinds.iter().all(|kind| has(*kind)), "{:?}", kinds.map(has));
     }
-    for kind in [PartKind::Level(3), PartKind::Listed, PartKind::Sides] {
+    for kind in [PartKind::Level(3), PartKind::Listed, PartKind::Sides, PartKind::Sums] {
         assert!(blocks.values().any(|(entry, _)| entry.part(kind).is_some()), "{kind}");
     }
     assert_eq!(blocks.values().filter(|(entry, _)| entry.lost).count(), 1);

@@ -69,7 +69,9 @@ pub(crate) struct ConvertArgs {
     missing: Option<MissingPolicy>,
     /// Keep more than the bound; may be repeated. `range`: no sample beyond the extremes of its window. `sign`: no sample
     /// changes its sign. `side=V,V...`: every sample stays below, at or above these values, so that isosurfaces of them
-    /// have the same pieces and holes
+    /// have the same pieces and holes. `sum`: sums of frames are those of the source. `difference=E`, `gradient=E`,
+    /// `curl=E`, `divergence=E`, `laplacian=E`: no derivative is off by more. `relative=S@F`: no sample of at least F is
+    /// off by more than a share
     #[arg(long, value_name = "WHAT", value_parser = keep, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     keep: Vec<Keep>,
     /// A value that means "missing"

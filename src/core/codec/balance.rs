@@ -1,0 +1,266 @@
+//! Finds what keeps the sum of the samples of each block and frame (eq 48), by decoding the block as a reader does.
+//!
+//! Samples that would leave their bound stay as they are, and the others are shifted by a little more. What is splatted is not shifted.
+
+use super::WindowCodec;
+use super::block_with_ghosts::SampleBytes;
+use super::bound;
+use super::check::{RowStats, Tally};
+use super::field::Field;
+use super::load::Source;
+use super::refine::Coded;
+use super::shifts::{ExactSum, FrameRun, RUN, add_shifts, allowed_sum, spacing};
+use super::sides::SidesOf;
+use crate::base::sample::{self, SampleType};
+use crate::base::vectors::dispatch;
+use crate::wavelet::LANES;
+use wavesplat_format::SumCodes;
+
+/// A block whose sums are to be kept, as it is decoded without that.
+struct Unbalanced<'a> {
+    of: &'a Source<'a>,
+    source: SampleBytes<'a>,
+    decoded: Vec<u8>,
+    /// Whether each sample is missing or stored exactly.
+    fixed: Vec<bool>,
+    sides: SidesOf,
+    unit: f64,
+}
+
+/// The samples of a frame of the block.
+struct Frame<'a> {
+    source: Vec<f64>,
+    decoded: &'a [u8],
+    fixed: &'a [bool],
+    /// As a reader returns them.
+    samples: Vec<f64>,
+    codes: SumCodes,
+}
+
+/// A code for a frame's sum, and the sum of the errors that remain.
+#[derive(Debug, Clone, Copy)]
+struct Tried {
+    code: i64,
+    sum: f64,
+}
+
+impl Source<'_> {
+    /// Codes what keeps the sums of the block's frames, and brings the tally up to date. `field` are the block's decoded coefficients. None
+    /// if the block must be stored exactly.
+    pub(super) fn keep_sums(&self, coded: &mut Coded, field: &Field<'_>) -> Option<SumCodes> {
+        let block = Unbalanced::new(self, coded, field);
+        let (mut all, mut tally) = (SumCodes { unit: block.unit, ..SumCodes::default() }, Tally::new());
+        let mut frame = None;
+        for number in 0..self.codec.frames() {
+            let frame = frame.get_or_insert_with(|| block.empty_frame());
+            block.load(number, frame);
+            block.balance(frame)?;
+            let first = (number * frame.source.len()) as u32;
+            all.frames.push(frame.codes.frames[0]);
+            all.unshifted.extend(frame.codes.unshifted.iter().map(|voxel| first + voxel));
+            frame.tally(self, number, &mut tally);
+        }
+        coded.tally = tally.with_splatted(&coded.tally);
+        all.is_valid().then_some(all)
+    }
+}
+
+impl<'a> Unbalanced<'a> {
+    fn new(of: &'a Source<'a>, coded: &Coded, field: &Field<'_>) -> Self {
+        let (codec, source, decoded) = (of.codec, of.samples.contiguous(), of.decoded(field));
+        let mut fixed = of.missing.mask().to_vec();
+        fixed.resize(of.samples.len(), false);
+        coded.outliers.positions.iter().for_each(|position| fixed[*position as usize] = true);
+        let largest = (of.missing.magnitude + codec.bound.delta).min(f64::MAX);
+        let unit = (spacing(codec.sample, largest) / 2.0).max(f64::MIN_POSITIVE);
+        Self { of, source, decoded, fixed, sides: SidesOf::new(codec), unit }
+    }
+
+    fn empty_frame(&self) -> Frame<'_> {
+        let numbers = vec![0.0; self.of.voxels()];
+        let codes = SumCodes { unit: self.unit, frames: vec![0], unshifted: Vec::new() };
+        Frame { source: numbers.clone(), decoded: &[], fixed: &[], samples: numbers, codes }
+    }
+
+    fn load<'b>(&'b self, number: usize, frame: &mut Frame<'b>) {
+        let (voxels, each) = (frame.source.len(), frame.source.len() * self.of.codec.sample.size());
+        sample::load(self.of.codec.sample, &self.source[number * each..][..each], &mut frame.source);
+        (frame.decoded, frame.fixed) =
+            (&self.decoded[number * each..][..each], &self.fixed[number * voxels..][..voxels]);
+        frame.codes.unshifted.clear();
+    }
+
+    /// Finds the code of a frame, and the samples that stay as they are. None if its sum cannot be kept.
+    fn balance(&self, frame: &mut Frame<'_>) -> Option<()> {
+        for _ in 0..TRIES {
+            self.find_code(frame)?;
+            let beyond = frame.beyond(self.of.codec);
+            if beyond.is_empty() {
+                return Some(());
+            }
+            if self.of.codec.sample.is_float() {
+                frame.add_to_others(beyond.len())?;
+            }
+            frame.codes.unshifted.extend(beyond);
+            frame.codes.unshifted.sort_unstable();
+            frame.codes.unshifted.dedup();
+        }
+        None
+    }
+
+    /// Finds the code that keeps the sum of a frame; leaves its samples. The sum never decreases with the code, so the codes that are too
+    /// small and too large enclose it.
+    fn find_code(&self, frame: &mut Frame<'_>) -> Option<()> {
+        let (codec, voxels) = (self.of.codec, frame.source.len());
+        let free = voxels - frame.fixed.iter().filter(|fixed| **fixed).count();
+        let allowed = allowed_sum(codec.sample, self.of.missing.magnitude, codec.bound.delta, free) / 2.0; // others add up otherwise
+        let shifted = free.saturating_sub(frame.codes.unshifted.len()).max(1) as f64;
+        let per_code = if codec.sample.is_float() { shifted * self.unit } else { shifted / voxels as f64 };
+        let (mut small, mut large) = (None::<Tried>, None::<Tried>);
+        let mut code = frame.codes.frames[0];
+        for tries in 0..CODES_TRIED {
+            frame.codes.frames[0] = code;
+            let sum = self.sum(frame);
+            let tried = Some(Tried { code, sum });
+            match () {
+                () if sum.abs() <= allowed => return Some(()),
+                () if sum < 0.0 => small = tried,
+                () if sum > 0.0 => large = tried,
+                () => return None, // no number
+            }
+            let step = (-sum / per_code).abs().max(1.0) * f64::from(1 << (tries / 2).min(30)); // some samples may not move
+            code = match (small, large) {
+                (Some(small), Some(large)) => between(small, large, tries % 3 == 2)?,
+                _ => code.checked_add(whole(step.copysign(-sum))?)?,
+            };
+        }
+        None
+    }
+
+    /// The sum of a frame's errors with its code. Leaves its samples.
+    fn sum(&self, frame: &mut Frame<'_>) -> f64 {
+        let (codec, voxels, mut sum) = (self.of.codec, frame.source.len(), ExactSum::default());
+        let (ty, mut bytes) = (codec.sample, [0; RUN * size_of::<f64>()]);
+        for first in (0..voxels).step_by(RUN) {
+            let count = RUN.min(voxels - first);
+            let bytes = &mut bytes[..count * ty.size()];
+            bytes.copy_from_slice(&frame.decoded[first * ty.size()..][..count * ty.size()]);
+            add_shifts(ty, &frame.codes, FrameRun { frame: 0, first, voxels }, bytes);
+            if let Some((lo, hi)) = codec.clip {
+                sample::clip(ty, lo, hi, bytes);
+            }
+            let (samples, source) = (&mut frame.samples[first..][..count], &frame.source[first..][..count]);
+            sample::load(ty, bytes, samples);
+            self.sides.place(source, samples);
+            let fixed = frame.fixed[first..][..count].iter().enumerate().filter(|(_, fixed)| **fixed);
+            fixed.for_each(|(at, _)| samples[at] = source[at]);
+            if ty == SampleType::F64 {
+                samples.iter().zip(source).for_each(|(sample, source)| sum.add(sample - source));
+            } else {
+                sum.add(dispatch!(sum_of_errors(&*samples, source))); // so few are added without loss
+            }
+        }
+        sum.total()
+    }
+}
+
+#[inline(always)]
+fn sum_of_errors(samples: &[f64], source: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (some, last) = samples.as_chunks::<LANES>();
+    let (of_some, of_last) = source.as_chunks::<LANES>();
+    for (samples, source) in some.iter().zip(of_some) {
+        for l in 0..LANES {
+            sums[l] += samples[l] - source[l];
+        }
+    }
+    sums.iter().sum::<f64>() + last.iter().zip(of_last).map(|(sample, source)| sample - source).sum::<f64>()
+}
+
+/// Rounds in which samples of a frame turn out to leave their bound.
+const TRIES: usize = 30;
+
+/// Codes that are tried for a frame. The first estimate nearly always fits.
+const CODES_TRIED: usize = 100;
+
+impl Frame<'_> {
+    /// Adds to the code what some samples will not be shifted by, spread over the others.
+    fn add_to_others(&mut self, count: usize) -> Option<()> {
+        let others = (self.source.len() - self.codes.unshifted.len()).saturating_sub(count).max(1);
+        let code = &mut self.codes.frames[0];
+        *code = code.checked_add(whole(*code as f64 * count as f64 / others as f64)?)?;
+        Some(())
+    }
+
+    /// The voxels whose samples are beyond their bound.
+    fn beyond(&self, codec: &WindowCodec) -> Vec<u32> {
+        let mut found = Vec::new();
+        for (first, [samples, sources]) in self.rows().filter(|(_, [a, b])| !is_clear(codec, &row_stats(a, b))) {
+            for (at, (sample, source)) in samples.iter().zip(sources).enumerate() {
+                let is_within = codec.error(*sample, *sample, *source) <= codec.bound.allowed(*source);
+                found.extend((!is_within && !self.fixed[first + at]).then_some((first + at) as u32));
+            }
+        }
+        found
+    }
+
+    /// Adds the samples of the frame to a tally.
+    fn tally(&self, of: &Source<'_>, number: usize, tally: &mut Tally) {
+        let (codec, place) = (of.codec, number * self.source.len());
+        for (first, [samples, sources]) in self.rows() {
+            let stats = row_stats(samples, sources);
+            if of.missing.count == 0 && is_clear(codec, &stats) {
+                tally.add_row(&stats, codec.bound.delta);
+                continue;
+            }
+            for (at, (sample, source)) in samples.iter().zip(sources).enumerate() {
+                if !of.missing.has(place + first + at) {
+                    let error = if self.fixed[first + at] { 0.0 } else { codec.error(*sample, *sample, *source) };
+                    tally.add(*sample, error);
+                    tally.add_share(bound::share(error, codec.bound.allowed(*source)));
+                }
+            }
+        }
+    }
+
+    /// The samples, and those of the source, in rows with the number of their first voxel.
+    fn rows(&self) -> impl Iterator<Item = (usize, [&[f64]; 2])> {
+        let rows = self.samples.chunks(RUN).zip(self.source.chunks(RUN)).map(|(samples, source)| [samples, source]);
+        (0..).step_by(RUN).zip(rows)
+    }
+}
+
+/// Whether all samples of a row are clearly within a bound that is the same for all, and none equals the declared missing value.
+fn is_clear(codec: &WindowCodec, row: &RowStats) -> bool {
+    let is_within = codec.bound.is_same() && row.largest.next_up() <= codec.bound.delta;
+    is_within && codec.missing_value.is_none_or(|missing| missing < row.min || row.max < missing)
+}
+
+fn row_stats(samples: &[f64], source: &[f64]) -> RowStats {
+    dispatch!(stats_of_row(samples, source))
+}
+
+#[inline(always)]
+fn stats_of_row(samples: &[f64], source: &[f64]) -> RowStats {
+    let mut found = RowStats { min: f64::INFINITY, max: f64::NEG_INFINITY, largest: 0.0, squares: 0.0 };
+    for (sample, source) in samples.iter().zip(source) {
+        let error = (sample - source).abs();
+        found.largest = if error <= found.largest { found.largest } else { error }; // keeps NaN
+        found.squares += error * error;
+        found.min = if *sample < found.min { *sample } else { found.min };
+        found.max = if *sample > found.max { *sample } else { found.max };
+    }
+    found
+}
+
+/// A code between two: in the middle, or where a line through their sums is zero.
+fn between(small: Tried, large: Tried, is_middle: bool) -> Option<i64> {
+    let (width, share) = (large.code.checked_sub(small.code)?, -small.sum / (large.sum - small.sum));
+    let step = whole(width as f64 * if is_middle { 0.5 } else { share })?.clamp(1, (width - 1).max(1));
+    (width > 1).then(|| small.code + step)
+}
+
+/// A number as the nearest whole number; none if it is none or very large.
+fn whole(number: f64) -> Option<i64> {
+    (number.abs() < 2f64.powi(53)).then(|| number.round() as i64)
+}
