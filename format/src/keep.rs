@@ -86,6 +86,15 @@ impl Keep {
         if count > MAX_SIDES { Err(format!("sides of {count} values; at most {MAX_SIDES}")) } else { Ok(keep) }
     }
 
+    /// All that several keep.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn joined(all: &[Self]) -> Result<Self, String> {
+        let words: Vec<String> = all.iter().map(ToString::to_string).collect();
+        Self::parse(&words.join(" "))
+    }
+
     /// What the settings of a file say. Unknown words are left to later versions: if a reader needs them, a feature tells it.
     pub(crate) fn of_settings(settings: &[(String, String)]) -> Self {
         let mut keep = Self::default();

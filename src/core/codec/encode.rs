@@ -16,6 +16,7 @@ use super::box_samples::BoxSamples;
 use super::buffer::{Buffer, clear};
 use super::check::Tally;
 use super::codes::Codes;
+use super::derived::{Computed, DerivedErrors};
 use super::error_weights::QuantizerSetup;
 use super::field::{Above, Field, Stored};
 use super::group::Group;
@@ -38,6 +39,8 @@ pub struct Encoder {
     compressor: Compressor,
     codes: Buffer<i32>,
     raw: Vec<u8>,
+    /// Results whose errors are measured.
+    computed: Option<Computed>,
 }
 
 /// A coded block, and facts that its bytes do not contain.
@@ -47,12 +50,19 @@ pub struct Encoded {
     pub block: EncodedBlock,
     /// The largest share of a series, rounded up: its error divided by its bound.
     pub share: f64,
+    /// How far results are off, as coefficients give the samples, if that is [measured](Encoder::measuring).
+    pub derived: Option<DerivedErrors>,
 }
 
 impl Encoder {
     /// Creates an encoder with a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
-        Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new() })
+        Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new(), computed: None })
+    }
+
+    /// The encoder, which also measures how far results are off.
+    pub fn measuring(self, computed: Computed) -> Self {
+        Self { computed: Some(computed), ..self }
     }
 
     /// Encodes a block of some voxels. `samples` are those of the known voxels, and may have room behind them for
@@ -84,15 +94,17 @@ impl Encoder {
                 block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut double, &mut self.codes)
             }
         };
+        let mut derived = None;
         let mut coded = coded;
         let mended = match &mut coded {
-            Some(of) if codec.mends() => {
+            Some(of) if codec.mends() || self.computed.is_some() => {
                 let field = match &codec.scheme.pyramid {
                     _ if of.step == 0.0 => Field::zero(codec),
                     None => Field::scaled(codec, of.step, &self.codes),
                     Some(pyramid) if pyramid.single => Field::single(single, of.marked.clone()),
                     Some(_) => Field::double(double, of.marked.clone()),
                 };
+                derived = self.computed.as_ref().map(|computed| block.derived(computed, Some((of, &field))));
                 block.mend(of, &field)
             }
             _ => {
@@ -116,7 +128,8 @@ impl Encoder {
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
             parts.sort_by_key(|part| part.kind); // exact parts and sides come after it
         }
-        Ok(Encoded { block: EncodedBlock { id, stats, parts }, share })
+        let derived = derived.or_else(|| self.computed.as_ref().map(|computed| block.derived(computed, None)));
+        Ok(Encoded { block: EncodedBlock { id, stats, parts }, share, derived })
     }
 
     /// Encodes a block of a tier above 0 that covers `size` voxels, and returns its decoded nodes for the blocks below. `of` are its

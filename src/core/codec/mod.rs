@@ -14,6 +14,7 @@ mod check;
 pub mod coarse;
 pub(crate) mod codes;
 pub mod decode;
+pub mod derived;
 pub mod encode;
 mod error_weights;
 pub mod field;

@@ -10,21 +10,22 @@ use super::{ConvertConfig, Plan, WindowJob, WindowsDone, bug};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::output::STANDARD;
-use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::progress::{Progress, Silent};
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
 use wavesplat_core::codec::bound::range_bound;
 use wavesplat_core::codec::buffer::Buffer;
-use wavesplat_core::codec::encode::Encoded;
+use wavesplat_core::codec::derived::{Computed, DerivedErrors, ResultErrors};
+use wavesplat_core::codec::encode::{Encoded, Encoder};
 use wavesplat_core::codec::scheme::Scheme;
 use wavesplat_core::source::scan::{Scan, scan_frame};
 use wavesplat_core::source::{Archive, FrameSource, FrameWindow, read_frames_into};
-use wavesplat_format::BlockId;
+use wavesplat_format::{BlockId, Keep};
 
 /// The largest number of blocks coded in a window, and of windows.
 const BLOCKS: usize = 24;
@@ -57,10 +58,41 @@ pub struct Estimate {
     pub blocks: usize,
     /// Windows with coded blocks.
     pub windows: usize,
+    /// How far results are off that are computed from the samples of the coded blocks; `None` of colours.
+    pub results: Option<ResultsOff>,
+    /// Bytes of the coefficient file with what is to be kept; `None` if nothing is.
+    pub kept_bytes: Option<u64>,
+}
+
+/// How far results are off that are computed from samples which keep only their bound.
+#[derive(Debug, Clone, Serialize)]
+pub struct ResultsOff {
+    /// The root mean square of the errors of differences between frames, as a share of that of the differences; `None` if these are 0.
+    pub difference: Option<f64>,
+    /// The same of gradients by central differences.
+    pub gradient: Option<f64>,
+    /// The same of Laplacians.
+    pub laplacian: Option<f64>,
+    /// The largest error of the mean of a frame of a block, in the samples' unit.
+    pub mean: f64,
+    /// How far decoded samples lie beyond the extremes of a frame of a block, at most, in the samples' unit.
+    pub beyond: f64,
+    /// For each side to be kept, the edges between neighbours that the isosurface crosses in only one of source and decoded samples, as a
+    /// share of those that it crosses in the source; `None` if it crosses none.
+    pub sides: Vec<Option<f64>>,
+}
+
+impl ResultsOff {
+    fn new(of: &DerivedErrors) -> Self {
+        let [difference, gradient, laplacian] = [of.difference, of.gradient, of.laplacian].map(ResultErrors::share);
+        let sides = of.crossings.iter().map(|crossings| crossings.share()).collect();
+        Self { difference, gradient, laplacian, mean: of.mean, beyond: of.beyond, sides }
+    }
 }
 
 /// Converts some blocks, spread over the volume and over time, and scales their size to the whole archive, for several
-/// configurations, which differ only in their tolerance. For a bound that refers to a range.
+/// configurations, which differ only in their tolerance. For a bound that refers to a range. What they keep is estimated beside files
+/// that keep nothing.
 ///
 /// # Errors
 /// Those of a conversion; also an error if the source is a stream.
@@ -101,21 +133,25 @@ pub fn estimates(
         let plan = Plan::new(&asked)?;
         let range = *input.config.range.get_or_insert(found);
         let (config, archive) = (&input.config, &input.archive);
-        let coded = BlocksCoded {
-            input: &input,
-            plan: &plan,
-            blocks: &blocks,
-            range: found,
-            is_rough,
-            encoders: Encoders::default(),
-        };
+        let plain = CodedInput { config: ConvertConfig { keep: Keep::default(), ..config.clone() }, ..input.clone() };
+        let coded = BlocksCoded { is_rough, ..BlocksCoded::new(&plain, &plan, &blocks, found) };
+        coded.measure(&config.keep)?;
         let bytes = coded.bytes(source, &windows, frames, &mut scheme, progress)?;
+        let results = coded.derived.into_inner().unwrap_or_default();
+        let results = input.colour_transform.is_none().then(|| ResultsOff::new(&results));
+        let kept_bytes = if config.keep.is_empty() {
+            None
+        } else {
+            let coded = BlocksCoded { is_rough, ..BlocksCoded::new(&input, &plan, &blocks, found) };
+            Some(coded.bytes(source, &windows, frames, &mut scheme, &Silent)? as u64)
+        };
         let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
         let error = range_bound(config.tolerance, range);
         let lost = variation.share_below(error).filter(|_| input.colour_transform.is_none());
         let (ratio, tolerance) = (raw / bytes.max(1.0), config.tolerance);
         let bytes = bytes as u64;
-        Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks: blocks.len(), windows: windows.len() })
+        let (blocks, windows) = (blocks.len(), windows.len());
+        Ok(Estimate { bytes, ratio, tolerance, error, lost, range, blocks, windows, results, kept_bytes })
     };
     let estimates = configs.iter().map(&mut estimated).collect::<Result<Vec<_>>>();
     codec::release_spare();
@@ -212,12 +248,30 @@ struct BlocksCoded<'a> {
     /// Whether schemes are chosen with less care.
     is_rough: bool,
     encoders: Encoders,
+    /// How far results are off so far, if that is measured.
+    derived: Mutex<DerivedErrors>,
 }
 
 /// The compressed share of a leaf of the directory, as measured on files of many kinds.
 const LEAF_SHARE: f64 = 0.5;
 
-impl BlocksCoded<'_> {
+impl<'a> BlocksCoded<'a> {
+    fn new(input: &'a CodedInput, plan: &'a Plan<'a>, blocks: &'a [usize], range: (f64, f64)) -> Self {
+        let (encoders, derived) = (Encoders::default(), Mutex::default());
+        Self { input, plan, blocks, range, is_rough: false, encoders, derived }
+    }
+
+    /// Measures from now on how far results are off, by an encoder for each thread.
+    fn measure(&self, keep: &Keep) -> Result<()> {
+        let computed = Computed { spacing: self.input.archive.grid.spacing, values: keep.sides.clone() };
+        while self.encoders.take().is_some() {}
+        (0..rayon::current_num_threads()).try_for_each(|_| {
+            let encoder = Encoder::new(self.input.config.level).map_err(bug)?;
+            self.encoders.put(encoder.measuring(computed.clone()));
+            Ok(())
+        })
+    }
+
     /// The bytes of a file of all `frames`, from those of some blocks in some windows. Rough choices begin with `scheme`, and leave
     /// the last one.
     fn bytes(
@@ -259,7 +313,10 @@ impl BlocksCoded<'_> {
         for ids in ids.chunks(self.plan.room(&job.codec).flight) {
             let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
             let level = self.input.config.level;
-            for Encoded { block, .. } in encode_together(level, self.plan, &self.encoders, job, blocks)? {
+            for Encoded { block, derived, .. } in encode_together(level, self.plan, &self.encoders, job, blocks)? {
+                if let (Some(derived), Ok(mut all)) = (derived, self.derived.lock()) {
+                    *all = std::mem::take(&mut *all).join(&derived);
+                }
                 bytes += block.stored_len() as f64 + LEAF_SHARE * block.entry_len() as f64;
                 voxels += self.plan.size(block.id).iter().product::<usize>();
             }

@@ -192,7 +192,7 @@ fn encode_block(
     let coded = encoder.coarse(&codec, id, plan.size(id), nodes, samples, above.as_ref());
     let (block, field) = coded.map_err(bug)?;
     window.coarse.add(&codec, &block, field)?;
-    Ok(Encoded { block, share: 0.0 })
+    Ok(Encoded { block, share: 0.0, derived: None })
 }
 
 /// Converts the samples of a block to those of its channel.

@@ -72,7 +72,7 @@ pub(crate) struct ConvertArgs {
     /// have the same pieces and holes. `sum`: sums of frames are those of the source. `difference=E`, `gradient=E`,
     /// `curl=E`, `divergence=E`, `laplacian=E`: no derivative is off by more. `relative=S@F`: no sample of at least F is
     /// off by more than a share
-    #[arg(long, value_name = "WHAT", value_parser = keep, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
+    #[arg(long, value_name = "WHAT", value_parser = Keep::parse, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     keep: Vec<Keep>,
     /// A value that means "missing"
     #[arg(long, value_name = "V", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
@@ -190,17 +190,6 @@ enum BoundName {
     Sampled,
 }
 
-/// Parses what is to be kept.
-fn keep(words: &str) -> std::result::Result<Keep, String> {
-    Keep::parse(words)
-}
-
-/// All that some options keep.
-fn joined(all: &[Keep]) -> std::result::Result<Keep, Error> {
-    let words: Vec<String> = all.iter().map(ToString::to_string).collect();
-    Keep::parse(&words.join(" ")).map_err(|what| Error::setting("keep", what))
-}
-
 impl ConvertArgs {
     /// The request that these options make.
     pub(super) fn request(&self) -> Result<ConvertRequest> {
@@ -212,7 +201,7 @@ impl ConvertArgs {
             range: self.range()?,
             missing: self.missing,
             missing_value: self.missing_value,
-            keep: joined(&self.keep)?,
+            keep: Keep::joined(&self.keep).map_err(|what| Error::setting("keep", what))?,
             transfer_function: colours.transpose()?,
             basis: self.basis,
             space: self.space,

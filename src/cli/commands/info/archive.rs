@@ -10,6 +10,7 @@ use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::Archive;
 use wavesplat_engine::convert::estimate::{Estimate, estimates};
 use wavesplat_engine::convert::{ConvertConfig, MissingPolicy};
+use wavesplat_format::Keep;
 
 /// The keys of `--json`.
 #[derive(Debug, Serialize)]
@@ -39,6 +40,9 @@ struct Info<'a> {
     estimate: Option<Estimate>,
     /// Estimates for several tolerances.
     estimates: Vec<Estimate>,
+    /// What `kept_bytes` of estimates keep.
+    #[serde(skip)]
+    keep: &'a Keep,
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<()> {
@@ -49,12 +53,17 @@ pub(super) fn run(args: &InfoArgs) -> Result<()> {
     let mut source = args.select.narrow(source)?;
     let archive = source.archive().clone();
     let progress = args.common.progress("estimate", "windows");
+    let keep = Keep::joined(&args.keep).map_err(|what| Error::setting("keep", what))?;
     let configs = |tolerances: &[f64]| -> Vec<ConvertConfig> {
-        tolerances.iter().map(|tolerance| config(*tolerance, args.common.memory.0, &archive)).collect()
+        let of = |tolerance: &f64| ConvertConfig {
+            keep: keep.clone(),
+            ..config(*tolerance, args.common.memory.0, &archive)
+        };
+        tolerances.iter().map(of).collect()
     };
     let asked = args.estimate.map(|one| one.map_or(configs(&TOLERANCES), |one| configs(&[one]))).unwrap_or_default();
     let estimates = estimates(source.as_mut(), &asked, &progress)?;
-    let info = Info::new(&archive, estimates, args.estimate.is_some_and(|one| one.is_some()));
+    let info = Info::new(&archive, &keep, estimates, args.estimate.is_some_and(|one| one.is_some()));
     if args.common.json {
         return args.common.report(&info, false);
     }
@@ -71,7 +80,7 @@ fn config(tolerance: f64, memory: usize, archive: &Archive) -> ConvertConfig {
 }
 
 impl<'a> Info<'a> {
-    fn new(archive: &'a Archive, mut estimates: Vec<Estimate>, single: bool) -> Self {
+    fn new(archive: &'a Archive, keep: &'a Keep, mut estimates: Vec<Estimate>, single: bool) -> Self {
         let labels = archive.time_labels();
         let estimate = if single { estimates.pop() } else { None };
         let frame = (archive.grid.whole().voxels() * archive.sample.size()) as u64;
@@ -96,6 +105,7 @@ impl<'a> Info<'a> {
             notes: archive.notes.iter().map(note_text).collect(),
             estimate,
             estimates,
+            keep,
         }
     }
 
@@ -132,6 +142,7 @@ impl<'a> Info<'a> {
                  (by {} blocks of {} windows)",
                 e.bytes, e.ratio, e.tolerance, e.range.0, e.range.1, e.blocks, e.windows
             );
+            text += &self.results(std::slice::from_ref(e));
         }
         text += &self.table();
         self.notes.iter().for_each(|note| text += &format!("note       {note}\n"));
@@ -152,6 +163,32 @@ impl<'a> Info<'a> {
             let lost = lost.map_or("-".into(), |lost| format!("{:.0} %", 100.0 * lost));
             let _ =
                 writeln!(text, "{tolerance:>20} {bytes:>13} {:>9} {error:>10.2e} {lost:>6}", format!("{ratio:.1}x"));
+        }
+        text + &self.results(&self.estimates)
+    }
+
+    /// How far results are off at some tolerances, a line for each, and what the promises cost.
+    fn results(&self, estimates: &[Estimate]) -> String {
+        let unit = self.units.map_or(String::new(), |unit| format!(", in {unit}"));
+        let sides = self.keep.sides.iter().map(|value| format!("side {value}"));
+        let names = ["difference", "gradient", "laplacian", "mean", "beyond"].map(String::from);
+        let cost = (!self.keep.is_empty()).then(|| "kept bytes".to_string());
+        let columns = names.into_iter().chain(sides).chain(cost).map(|name| format!(" {name:>11}")).collect::<String>();
+        let mut text = format!(
+            "results    errors without --keep: root mean square, as a share of the result's; mean of a frame of a block, and beyond its \
+             extremes: at most{unit}"
+        );
+        text += if self.keep.sides.is_empty() { "\n" } else { "; side: edges that the surface crosses wrongly\n" };
+        let _ = writeln!(text, "{:>20}{columns}", "tolerance");
+        let percent = |share: &Option<f64>| share.map_or("-".into(), |share| format!("{:.2} %", 100.0 * share));
+        for Estimate { tolerance, results, kept_bytes, .. } in estimates {
+            let Some(results) = results else { return String::new() };
+            let shares = [&results.difference, &results.gradient, &results.laplacian].map(percent).into_iter();
+            let cells = shares
+                .chain([results.mean, results.beyond].map(|error| format!("{error:.2e}")))
+                .chain(results.sides.iter().map(percent));
+            let cells = cells.chain(kept_bytes.map(|bytes| bytes.to_string())).map(|cell| format!(" {cell:>11}"));
+            let _ = writeln!(text, "{tolerance:>20}{}", cells.collect::<String>());
         }
         text
     }

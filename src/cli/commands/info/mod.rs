@@ -11,6 +11,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_engine::file::CoefficientFile;
+use wavesplat_format::Keep;
 
 /// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
 #[derive(Debug, Args)]
@@ -20,7 +21,8 @@ Examples:
   wavesplat info run.wspl --json | jq .windows
   wavesplat info run.nc
   wavesplat info frames/ --estimate
-  wavesplat info frames/ --estimate 0.001")]
+  wavesplat info frames/ --estimate 0.001
+  wavesplat info frames/ --estimate --keep side=0.5")]
 pub(crate) struct InfoArgs {
     /// A coefficient file, or frames as for convert
     #[arg(required = true)]
@@ -29,6 +31,9 @@ pub(crate) struct InfoArgs {
     /// five tolerances if none is given]
     #[arg(long, value_name = "X", value_parser = tolerance, num_args = 0..=1)]
     estimate: Option<Option<f64>>,
+    /// With --estimate: also with what samples keep, as for convert
+    #[arg(long, value_name = "WHAT", value_parser = Keep::parse, allow_hyphen_values = true, requires = "estimate")]
+    keep: Vec<Keep>,
     #[command(flatten)]
     select: SelectArgs,
     #[command(flatten)]
