@@ -74,7 +74,7 @@ pub enum PartKind {
     Listed,
     /// On which side of some values samples are that would be decoded on another.
     Sides,
-    /// What samples need so that the sums of frames are those of the source.
+    /// The shifts that keep the sums of a block's frames.
     Sums,
 }
 

@@ -126,14 +126,14 @@ impl Keep {
                 let error = amount(value).ok_or_else(|| format!("{word}: not a finite number of 0 or more"))?;
                 self.derivatives.push(DerivativeBound { derivative, error });
             }
-            _ => return Err(format!("{word}: unknown; {WORDS}")),
+            _ => return Err(format!("{word}: not understood; takes {WORDS}")),
         }
         Ok(())
     }
 
     fn add_relative(&mut self, value: &str) -> Result<(), String> {
         let (share, floor) = value.split_once('@').unwrap_or((value, "0"));
-        let wrong = || format!("relative={value}: takes a share, perhaps with @ and the least magnitude, as 0.01@5");
+        let wrong = || format!("relative={value}: takes SHARE or SHARE@FLOOR, such as 0.01@5");
         let bound = RelativeBound { share: amount(share).ok_or_else(wrong)?, floor: amount(floor).ok_or_else(wrong)? };
         if self.relative.replace(bound).is_some_and(|before| before != bound) {
             return Err("relative: give it once".into());
@@ -149,6 +149,11 @@ impl Keep {
         self.derivatives.dedup_by_key(|of| of.derivative); // the smallest error of each stays
     }
 
+    /// Whether a bound of the mean holds for each sample, because single samples have limits or are shifted.
+    pub fn limits_samples(&self) -> bool {
+        self.sum || self.relative.is_some() || !self.derivatives.is_empty()
+    }
+
     /// Whether nothing is kept.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -156,7 +161,7 @@ impl Keep {
 }
 
 /// The words, for a user.
-const WORDS: &str = "range, sum, sign, side=VALUE[,VALUE...], relative=SHARE[@LEAST], and difference, gradient, curl, divergence or \
+const WORDS: &str = "range, sum, sign, side=VALUE[,VALUE...], relative=SHARE[@FLOOR], and difference, gradient, curl, divergence or \
                      laplacian with =ERROR";
 
 fn number(text: &str) -> Option<f64> {

@@ -175,11 +175,11 @@ fn unrecoverable_files_are_reported() {
     work.write("start.wspl", &file[..700]);
     work.wavesplat("recover start.wspl -o saved.wspl").fails(3, &["start.wspl", "nothing can be recovered"]);
     let mut newer = file.clone();
-    newer[16] = 32; // a feature of a later version
+    newer[16] = 64; // a feature of a later version
     let sum = xxhash_rust::xxh3::xxh3_64(&newer[..120]).to_le_bytes();
     newer[120..128].copy_from_slice(&sum);
     work.write("newer.wspl", &newer);
-    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 5"]);
+    work.wavesplat("recover newer.wspl -o saved.wspl").fails(3, &["newer.wspl", "not supported", "feature bit 6"]);
     work.wavesplat("recover a.wspl -o a.wspl --force").fails(2, &["would replace the input"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "newer.wspl", "start.wspl", "text.wspl"]);
 }

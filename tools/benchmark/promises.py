@@ -72,7 +72,7 @@ def rows_of(archive, args):
     series = np.load(archive)
     low, high = float(series.min()), float(series.max())
     some = series[::2, ::4, ::4, ::4]
-    values = {"range": None, "sign": 0.0, "side, middle of the range": 0.5 * (low + high), "side, 90 % are below": np.quantile(some, 0.9)}
+    values = {"range": None, "sum": None, "sign": 0.0, "side, middle of the range": 0.5 * (low + high), "side, 90 % are below": np.quantile(some, 0.9)}
     name = os.path.splitext(os.path.basename(archive))[0]
     with tempfile.TemporaryDirectory(dir=args.work) as work:
         programs = Programs(args.bin, archive, work, args.rounds)
@@ -80,7 +80,7 @@ def rows_of(archive, args):
             plain, convert, extract = programs.measured(tolerance, None)
             for what, value in values.items():
                 value = None if value is None else float(series.dtype.type(value))
-                keep = what if what in ("range", "sign") else f"side={value!r}"
+                keep = what if what in ("range", "sum", "sign") else f"side={value!r}"
                 kept, slower, read = programs.measured(tolerance, keep)
                 cells = [name, tolerance, what, str(plain), f"{100 * (kept / plain - 1):.2f} %"]
                 cells += [f"{slower / convert:.2f}", f"{read / extract:.2f}"]

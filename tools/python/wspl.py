@@ -508,7 +508,7 @@ def plain_sum(values) -> float:
 
 
 def check_block(b: Block, w: Window, size: tuple[int, ...], sample_bytes: int, announced: set) -> None:
-    """Sections 5 and 9: an entry by itself and with the block's geometry. `announced`: the kinds and levels that need a feature."""
+    """Sections 5 and 9: an entry by itself and with the block's geometry. `announced`: the (kind, level) pairs whose feature the header has."""
     place = b.place
     need(b.lost <= 1, place, "lost is neither 0 nor 1")
     need(finite(b.step, b.reached) and b.reached >= 0, place, "step or error is not finite")

@@ -10,6 +10,7 @@ use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::report::{BoundReport, largest_bound};
 use wavesplat_engine::file::shard::frames_of_shard;
 use wavesplat_engine::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
+use wavesplat_format::Keep;
 
 /// Check a coefficient file for damage, and its error bound against the source
 #[derive(Debug, Args)]
@@ -65,7 +66,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     if args.common.json {
         args.common.report(&Reported { report: &report, promise, delta }, false)?;
     } else if !args.common.quiet {
-        print(&summary(&report, &promise))?;
+        print(&summary(&report, &promise, &file.metadata().keep()))?;
     }
     if report.damaged > 0 {
         let (count, first) = (report.damaged, &report.damage[0]);
@@ -119,7 +120,7 @@ fn places(count: u64) -> String {
     if count == 1 { "1 place".into() } else { format!("{count} places") }
 }
 
-fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
+fn summary(r: &VerifyReport, promise: &BoundReport, keep: &Keep) -> String {
     let estimate = promise.caution();
     let state = if r.damaged == 0 { "whole".into() } else { format!("DAMAGED in {}", places(r.damaged)) };
     let mut text = format!("{} blocks, {} bytes: {state}\n", r.blocks, r.bytes);
@@ -147,6 +148,10 @@ fn summary(r: &VerifyReport, promise: &BoundReport) -> String {
             c.missing,
             c.samples
         );
+        if !keep.is_empty() {
+            let held = if c.not_kept == 0 && c.series_outside == 0 { "kept" } else { "MISSED" };
+            text += &format!("{held} besides: {keep}\n");
+        }
     }
     text
 }

@@ -9,7 +9,7 @@ use super::check::{RowStats, Tally};
 use super::field::Field;
 use super::load::Source;
 use super::refine::Coded;
-use super::shifts::{ExactSum, FrameRun, RUN, add_shifts, allowed_sum, spacing};
+use super::shifts::{CompensatedSum, FrameRun, RUN, add_shifts, allowed_sum, spacing};
 use super::sides::SidesOf;
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
@@ -50,11 +50,10 @@ impl Source<'_> {
     pub(super) fn keep_sums(&self, coded: &mut Coded, field: &Field<'_>) -> Option<SumCodes> {
         let block = Unbalanced::new(self, coded, field);
         let (mut all, mut tally) = (SumCodes { unit: block.unit, ..SumCodes::default() }, Tally::new());
-        let mut frame = None;
+        let mut frame = block.empty_frame();
         for number in 0..self.codec.frames() {
-            let frame = frame.get_or_insert_with(|| block.empty_frame());
-            block.load(number, frame);
-            block.balance(frame)?;
+            block.load(number, &mut frame); // the code of the frame before is the first guess
+            block.balance(&mut frame)?;
             let first = (number * frame.source.len()) as u32;
             all.frames.push(frame.codes.frames[0]);
             all.unshifted.extend(frame.codes.unshifted.iter().map(|voxel| first + voxel));
@@ -108,12 +107,12 @@ impl<'a> Unbalanced<'a> {
         None
     }
 
-    /// Finds the code that keeps the sum of a frame; leaves its samples. The sum never decreases with the code, so the codes that are too
-    /// small and too large enclose it.
+    /// Finds the code that keeps the sum of a frame, by false position and bisection: the sum never decreases with the code. Writes the
+    /// frame's samples.
     fn find_code(&self, frame: &mut Frame<'_>) -> Option<()> {
         let (codec, voxels) = (self.of.codec, frame.source.len());
         let free = voxels - frame.fixed.iter().filter(|fixed| **fixed).count();
-        let allowed = allowed_sum(codec.sample, self.of.missing.magnitude, codec.bound.delta, free) / 2.0; // others add up otherwise
+        let allowed = allowed_sum(codec.sample, self.of.missing.magnitude, codec.bound.delta, free) / 2.0; // readers add in another order
         let shifted = free.saturating_sub(frame.codes.unshifted.len()).max(1) as f64;
         let per_code = if codec.sample.is_float() { shifted * self.unit } else { shifted / voxels as f64 };
         let (mut small, mut large) = (None::<Tried>, None::<Tried>);
@@ -122,13 +121,16 @@ impl<'a> Unbalanced<'a> {
             frame.codes.frames[0] = code;
             let sum = self.sum(frame);
             let tried = Some(Tried { code, sum });
-            match () {
-                () if sum.abs() <= allowed => return Some(()),
-                () if sum < 0.0 => small = tried,
-                () if sum > 0.0 => large = tried,
-                () => return None, // no number
+            if sum.abs() <= allowed {
+                return Some(());
+            } else if sum < 0.0 {
+                small = tried;
+            } else if sum > 0.0 {
+                large = tried;
+            } else {
+                return None; // NaN
             }
-            let step = (-sum / per_code).abs().max(1.0) * f64::from(1 << (tries / 2).min(30)); // some samples may not move
+            let step = (-sum / per_code).abs().max(1.0) * f64::from(1 << (tries / 2).min(30)); // clamped samples do not move
             code = match (small, large) {
                 (Some(small), Some(large)) => between(small, large, tries % 3 == 2)?,
                 _ => code.checked_add(whole(step.copysign(-sum))?)?,
@@ -137,9 +139,9 @@ impl<'a> Unbalanced<'a> {
         None
     }
 
-    /// The sum of a frame's errors with its code. Leaves its samples.
+    /// The sum of a frame's errors with its code. Writes the frame's samples.
     fn sum(&self, frame: &mut Frame<'_>) -> f64 {
-        let (codec, voxels, mut sum) = (self.of.codec, frame.source.len(), ExactSum::default());
+        let (codec, voxels, mut sum) = (self.of.codec, frame.source.len(), CompensatedSum::default());
         let (ty, mut bytes) = (codec.sample, [0; RUN * size_of::<f64>()]);
         for first in (0..voxels).step_by(RUN) {
             let count = RUN.min(voxels - first);
@@ -157,7 +159,7 @@ impl<'a> Unbalanced<'a> {
             if ty == SampleType::F64 {
                 samples.iter().zip(source).for_each(|(sample, source)| sum.add(sample - source));
             } else {
-                sum.add(dispatch!(sum_of_errors(&*samples, source))); // so few are added without loss
+                sum.add(dispatch!(sum_of_errors(&*samples, source))); // the rounding of so few is far below what is allowed
             }
         }
         sum.total()
@@ -253,14 +255,14 @@ fn stats_of_row(samples: &[f64], source: &[f64]) -> RowStats {
     found
 }
 
-/// A code between two: in the middle, or where a line through their sums is zero.
+/// A code between two, by bisection or false position.
 fn between(small: Tried, large: Tried, is_middle: bool) -> Option<i64> {
     let (width, share) = (large.code.checked_sub(small.code)?, -small.sum / (large.sum - small.sum));
     let step = whole(width as f64 * if is_middle { 0.5 } else { share })?.clamp(1, (width - 1).max(1));
     (width > 1).then(|| small.code + step)
 }
 
-/// A number as the nearest whole number; none if it is none or very large.
+/// Rounds to the nearest integer; none for NaN and from 2^53 on.
 fn whole(number: f64) -> Option<i64> {
     (number.abs() < 2f64.powi(53)).then(|| number.round() as i64)
 }

@@ -8,6 +8,8 @@
 //! rms          sqrt(mean over the present frames of a window of (v^ - v)^2) <= delta                      (eq 23)
 //! ```
 //!
+//! `--keep` may limit single samples further ([`limits`](super::limits), eq 47).
+//!
 //! The weights w_i of the voxels at a pixel are positive (eq 3). So eq 21 bounds every pixel of every view, by the
 //! triangle inequality:
 //!
@@ -177,7 +179,7 @@ impl ErrorBound {
         };
         let Some(limits) = self.limits else { return of_bound };
         let of_share = limits.share_at(value).map_or(f64::INFINITY, |share| relative_bound(share, 0.0, value));
-        of_bound.min(of_share).min(limits.largest)
+        of_bound.min(of_share).min(self.delta)
     }
 
     /// As [`Self::allowed`], without directed rounding; 0 if it may underflow.
@@ -187,10 +189,9 @@ impl ErrorBound {
             Bound::Relative { floor } => self.tolerance * if value.abs() > floor { value.abs() } else { floor },
             _ => self.delta,
         };
-        let (share, largest) =
-            self.limits.map_or((None, f64::INFINITY), |limits| (limits.share_at(value), limits.largest));
+        let (share, delta) = self.limits.map_or((None, f64::INFINITY), |limits| (limits.share_at(value), self.delta));
         let of_share = share.map_or(f64::INFINITY, |share| share * value.abs());
-        let of_limits = if of_share < largest { of_share } else { largest };
+        let of_limits = if of_share < delta { of_share } else { delta };
         let allowed = if of_limits < of_bound { of_limits } else { of_bound };
         if allowed < UNDERFLOW { 0.0 } else { allowed }
     }

@@ -66,7 +66,7 @@ pub(super) struct Ranges {
 pub(super) struct RowStats {
     pub(super) min: f64,
     pub(super) max: f64,
-    /// The largest error, not rounded up; not a number if one is none.
+    /// The largest error, not rounded up; NaN if any error is NaN.
     pub(super) largest: f64,
     pub(super) squares: f64,
 }

@@ -1,5 +1,4 @@
-//! How far results that are computed from the samples of a block are off once it is decoded. Estimates show them, so that a user sees what
-//! to promise.
+//! Measures the errors of what is computed from decoded samples, so that estimates show what to promise.
 
 use crate::base::sample::join_ranges;
 use wavesplat_format::Side;
@@ -67,12 +66,12 @@ pub struct DerivedErrors {
     /// The largest error of the mean of a frame of a block.
     pub mean: f64,
     /// How far decoded samples lie beyond the extremes of a frame of a block, at most.
-    pub beyond: f64,
+    pub overshoot: f64,
     /// For each value of [`Computed::values`].
     pub crossings: Vec<Crossings>,
 }
 
-/// A frame of a block: samples of the source, and decoded ones. Missing samples are not numbers.
+/// A frame of a block: samples of the source, and decoded ones. Missing samples are NaN.
 #[derive(Debug, Clone, Copy)]
 pub struct FramePair<'a> {
     /// x fastest.
@@ -136,7 +135,7 @@ impl DerivedErrors {
         }
         self.mean = self.mean.max((errors / count.max(1) as f64).abs());
         if count > 0 {
-            self.beyond = self.beyond.max(ranges[0].0 - ranges[1].0).max(ranges[1].1 - ranges[0].1);
+            self.overshoot = self.overshoot.max(ranges[0].0 - ranges[1].0).max(ranges[1].1 - ranges[0].1);
         }
     }
 
@@ -175,7 +174,7 @@ impl DerivedErrors {
             gradient: self.gradient.join(other.gradient),
             laplacian: self.laplacian.join(other.laplacian),
             mean: self.mean.max(other.mean),
-            beyond: self.beyond.max(other.beyond),
+            overshoot: self.overshoot.max(other.overshoot),
             crossings: both.map(add).collect(),
         }
     }
@@ -210,7 +209,7 @@ mod tests {
         assert_eq!([found.difference, found.gradient, found.laplacian].map(ResultErrors::share), [Some(1.0); 3]);
         assert_eq!(found.laplacian, ResultErrors { results: 2.0 * 24.0 * 24.0, errors: 2.0 * 24.0 * 24.0 });
         assert_eq!(found.gradient.results, 12.0 * 12.0 + 24.0 * 24.0);
-        assert_eq!((found.mean, found.beyond), (source.iter().sum::<f64>() / 36.0, 27.0));
+        assert_eq!((found.mean, found.overshoot), (source.iter().sum::<f64>() / 36.0, 27.0));
         // 0, 3, 12, 27 cross 5 between x = 1 and 2; 0, 6, 24, 54 between 0 and 1.
         assert_eq!(found.crossings, [Crossings { crossed: 9, changed: 18 }]);
         let twice = found.clone().join(&found);

@@ -85,7 +85,7 @@ impl Encoder {
         let missing = Missing::within(codec, samples, &missing_around);
         let block = Source { codec, samples: *samples, missing: &missing };
         let (mut single, mut double) = (Buffer::default(), Buffer::default());
-        let coded = match &codec.scheme.pyramid {
+        let mut coded = match &codec.scheme.pyramid {
             None => self.series(&block),
             Some(pyramid) if pyramid.single => {
                 block.refine(pyramid, size, &outer, above.map(Above::singles), &mut single, &mut self.codes)
@@ -94,23 +94,16 @@ impl Encoder {
                 block.refine(pyramid, size, &outer, above.map(Above::doubles), &mut double, &mut self.codes)
             }
         };
-        let mut derived = None;
-        let mut coded = coded;
-        let mended = match &mut coded {
-            Some(of) if codec.mends() || self.computed.is_some() => {
-                let field = match &codec.scheme.pyramid {
-                    _ if of.step == 0.0 => Field::zero(codec),
-                    None => Field::scaled(codec, of.step, &self.codes),
-                    Some(pyramid) if pyramid.single => Field::single(single, of.marked.clone()),
-                    Some(_) => Field::double(double, of.marked.clone()),
-                };
-                derived = self.computed.as_ref().map(|computed| block.derived(computed, Some((of, &field))));
-                block.mend(of, &field)
-            }
-            _ => {
-                drop((single, double)); // packing takes memory
-                Some(Mended::default())
-            }
+        let (mended, derived) = {
+            let is_needed = codec.mends() || self.computed.is_some();
+            // Without need, the buffers go here: packing takes memory.
+            let field = coded.as_ref().filter(|_| is_needed).map(|coded| self.field(codec, coded, single, double));
+            let derived = self.computed.as_ref().map(|of| match (&coded, &field) {
+                (Some(coded), Some(field)) => of.errors_in(&block, &block.restored(coded, field)),
+                _ => of.errors_in(&block, &block.samples.contiguous()),
+            });
+            let mended = coded.as_mut().zip(field.as_ref()).map(|(coded, field)| block.mend(coded, field));
+            (mended.unwrap_or_else(|| Some(Mended::default())), derived)
         };
         let (coded, mended) = mended.map_or((None, Mended::default()), |mended| (coded, mended));
         let parts = match &coded {
@@ -126,10 +119,19 @@ impl Encoder {
             pack_missing(missing.mask(), &missing.samples(samples), codec.sample.size(), clear(&mut self.raw));
             let stats = PartStats { count: missing.count, energy: 0.0, largest: 0.0 };
             parts.push(self.compressor.part(PartKind::Missing, stats, &self.raw)?);
-            parts.sort_by_key(|part| part.kind); // exact parts and sides come after it
+            parts.sort_by_key(|part| part.kind); // exact parts, sides and sums come after it
         }
-        let derived = derived.or_else(|| self.computed.as_ref().map(|computed| block.derived(computed, None)));
         Ok(Encoded { block: EncodedBlock { id, stats, parts }, share, derived })
+    }
+
+    /// The decoded coefficients of a block; `single` or `double` are its nodes, if a pyramid refines it.
+    fn field(&self, codec: &WindowCodec, coded: &Coded, single: Buffer<f32>, double: Buffer<f64>) -> Field<'_> {
+        match &codec.scheme.pyramid {
+            _ if coded.step == 0.0 => Field::zero(codec),
+            None => Field::scaled(codec, coded.step, &self.codes),
+            Some(pyramid) if pyramid.single => Field::single(single, coded.marked.clone()),
+            Some(_) => Field::double(double, coded.marked.clone()),
+        }
     }
 
     /// Encodes a block of a tier above 0 that covers `size` voxels, and returns its decoded nodes for the blocks below. `of` are its

@@ -30,12 +30,11 @@ pub struct SampleLimits {
 }
 
 impl SampleLimits {
-    /// Those that keep what a file of a grid keeps; `None` if nothing limits errors. Sums limit those of means to delta: samples are
-    /// shifted one by one.
+    /// Those that keep what a file of a grid keeps; `None` if single samples have none. With `sum`, a bound of the mean holds for each
+    /// sample: no error exceeds delta.
     pub fn new(keep: &Keep, dims: [usize; 3], spacing: [f64; 3]) -> Option<Self> {
         let largest = keep.derivatives.iter().map(|of| largest_error(*of, dims, spacing)).fold(f64::INFINITY, f64::min);
-        let is_limited = largest < f64::INFINITY || keep.relative.is_some() || keep.sum;
-        is_limited.then_some(Self { largest, relative: keep.relative })
+        keep.limits_samples().then_some(Self { largest, relative: keep.relative })
     }
 
     /// The share of a sample that its error may be, if one applies to it.
@@ -95,7 +94,7 @@ mod tests {
     #[test]
     fn axes_without_neighbours_do_not_limit() {
         let keep = Keep::parse("gradient=1 laplacian=1").expect("words");
-        assert_eq!(SampleLimits::new(&keep, [2, 1, 2], [1.0; 3]), None);
+        assert_eq!(SampleLimits::new(&keep, [2, 1, 2], [1.0; 3]).expect("a limit").largest, f64::INFINITY);
         let limit = SampleLimits::new(&keep, [2, 8, 1], [1e-6, 2.0, 1.0]).expect("a limit").largest;
         assert!((0.999..=1.0).contains(&limit), "{limit}: 4 / 2^2 of the second derivative along y");
         assert_eq!(SampleLimits::new(&Keep::parse("range sign").expect("words"), [8; 3], [1.0; 3]), None);

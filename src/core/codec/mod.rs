@@ -24,6 +24,7 @@ mod group;
 mod limits;
 mod listed;
 mod load;
+mod measured;
 mod mend;
 mod moved;
 mod order;

@@ -31,14 +31,14 @@ pub(super) fn spacing(ty: SampleType, magnitude: f64) -> f64 {
     (magnitude * relative).max(least)
 }
 
-/// A sum of numbers, with what rounding loses ([Knuth](crate::bibliography)).
+/// A compensated sum: with what rounding loses ([Knuth](crate::bibliography)).
 #[derive(Debug, Clone, Copy, Default)]
-pub struct ExactSum {
+pub struct CompensatedSum {
     sum: f64,
     lost: f64,
 }
 
-impl ExactSum {
+impl CompensatedSum {
     /// Adds a number.
     pub fn add(&mut self, number: f64) {
         let sum = self.sum + number;
@@ -156,10 +156,10 @@ mod tests {
     }
 
     #[test]
-    fn exact_sums_lose_nothing() {
-        let mut sum = ExactSum::default();
+    fn compensated_sums_lose_little() {
+        let mut sum = CompensatedSum::default();
         [1e16, 1.0, -1e16, 3.0, 1e-20].into_iter().for_each(|number| sum.add(number));
         assert_eq!(sum.total(), 4.0);
-        assert!(ExactSum { sum: f64::NAN, lost: 0.0 }.total().is_nan());
+        assert!(CompensatedSum { sum: f64::NAN, lost: 0.0 }.total().is_nan());
     }
 }

@@ -2,6 +2,7 @@
 
 use super::coded_input::CodedInput;
 use super::gather::WindowReader;
+use super::plan::check_keep;
 use super::record::window_record;
 use super::spread::evenly;
 use super::variation::Variation;
@@ -14,7 +15,7 @@ use std::sync::{Arc, Mutex};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::output::STANDARD;
-use wavesplat_core::base::progress::{Progress, Silent};
+use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{self, join_ranges};
 use wavesplat_core::codec;
 use wavesplat_core::codec::block_with_ghosts::BlockWithGhosts;
@@ -76,7 +77,7 @@ pub struct ResultsOff {
     /// The largest error of the mean of a frame of a block, in the samples' unit.
     pub mean: f64,
     /// How far decoded samples lie beyond the extremes of a frame of a block, at most, in the samples' unit.
-    pub beyond: f64,
+    pub overshoot: f64,
     /// For each side to be kept, the edges between neighbours that the isosurface crosses in only one of source and decoded samples, as a
     /// share of those that it crosses in the source; `None` if it crosses none.
     pub sides: Vec<Option<f64>>,
@@ -86,7 +87,7 @@ impl ResultsOff {
     fn new(of: &DerivedErrors) -> Self {
         let [difference, gradient, laplacian] = [of.difference, of.gradient, of.laplacian].map(ResultErrors::share);
         let sides = of.crossings.iter().map(|crossings| crossings.share()).collect();
-        Self { difference, gradient, laplacian, mean: of.mean, beyond: of.beyond, sides }
+        Self { difference, gradient, laplacian, mean: of.mean, overshoot: of.overshoot, sides }
     }
 }
 
@@ -109,16 +110,18 @@ pub fn estimates(
             "an estimate needs frames that can be read more than once, not standard input",
         ));
     };
+    check_keep(&CodedInput::new(config, &source_archive))?;
     let source_archive = Archive { description: None, ..source_archive }; // it is not of some blocks
     let first = CodedInput::new(config, &source_archive);
     let plan = Plan::new(&first)?;
     let windows = some_windows(frames, first.config.window);
     let is_rough = source_archive.grid.whole().voxels().saturating_mul(frames) > FEW_SAMPLES;
     let all = plan.blocks.len().saturating_mul(frames.div_ceil(first.config.window));
-    let most = if is_rough { blocks_of_window(all, windows.len() * configs.len()) } else { BLOCKS };
+    let runs = windows.len() * configs.len() * if config.keep.is_empty() { 1 } else { 2 };
+    let most = if is_rough { blocks_of_window(all, runs) } else { BLOCKS };
     let most = if plan.tiers > 0 { (most / 2).max(LEAST_BLOCKS) } else { most }; // the blocks above are coded, too
     let blocks = some_blocks(&plan.blocks, most);
-    progress.start(Some((windows.len() * configs.len()) as u64));
+    progress.start(Some(runs as u64));
     let read = FramesRead {
         archive: &source_archive,
         missing_value: first.config.missing_value,
@@ -133,17 +136,20 @@ pub fn estimates(
         let plan = Plan::new(&asked)?;
         let range = *input.config.range.get_or_insert(found);
         let (config, archive) = (&input.config, &input.archive);
+        let sides = config.keep.sides.clone();
         let plain = CodedInput { config: ConvertConfig { keep: Keep::default(), ..config.clone() }, ..input.clone() };
-        let coded = BlocksCoded { is_rough, ..BlocksCoded::new(&plain, &plan, &blocks, found) };
-        coded.measure(&config.keep)?;
+        let computed = Computed { spacing: archive.grid.spacing, values: sides };
+        let coded =
+            BlocksCoded { is_rough, computed: Some(computed), ..BlocksCoded::new(&plain, &plan, &blocks, found) };
         let bytes = coded.bytes(source, &windows, frames, &mut scheme, progress)?;
         let results = coded.derived.into_inner().unwrap_or_default();
         let results = input.colour_transform.is_none().then(|| ResultsOff::new(&results));
-        let kept_bytes = if config.keep.is_empty() {
-            None
-        } else {
-            let coded = BlocksCoded { is_rough, ..BlocksCoded::new(&input, &plan, &blocks, found) };
-            Some(coded.bytes(source, &windows, frames, &mut scheme, &Silent)? as u64)
+        let kept_bytes = match config.keep.is_empty() {
+            true => None,
+            false => {
+                let coded = BlocksCoded { is_rough, ..BlocksCoded::new(&input, &plan, &blocks, found) };
+                Some(coded.bytes(source, &windows, frames, &mut scheme, progress)? as u64)
+            }
         };
         let raw = archive.grid.whole().voxels() as f64 * frames as f64 * source_archive.sample.size() as f64;
         let error = range_bound(config.tolerance, range);
@@ -248,6 +254,8 @@ struct BlocksCoded<'a> {
     /// Whether schemes are chosen with less care.
     is_rough: bool,
     encoders: Encoders,
+    /// Results whose errors are measured.
+    computed: Option<Computed>,
     /// How far results are off so far, if that is measured.
     derived: Mutex<DerivedErrors>,
 }
@@ -258,18 +266,7 @@ const LEAF_SHARE: f64 = 0.5;
 impl<'a> BlocksCoded<'a> {
     fn new(input: &'a CodedInput, plan: &'a Plan<'a>, blocks: &'a [usize], range: (f64, f64)) -> Self {
         let (encoders, derived) = (Encoders::default(), Mutex::default());
-        Self { input, plan, blocks, range, is_rough: false, encoders, derived }
-    }
-
-    /// Measures from now on how far results are off, by an encoder for each thread.
-    fn measure(&self, keep: &Keep) -> Result<()> {
-        let computed = Computed { spacing: self.input.archive.grid.spacing, values: keep.sides.clone() };
-        while self.encoders.take().is_some() {}
-        (0..rayon::current_num_threads()).try_for_each(|_| {
-            let encoder = Encoder::new(self.input.config.level).map_err(bug)?;
-            self.encoders.put(encoder.measuring(computed.clone()));
-            Ok(())
-        })
+        Self { input, plan, blocks, range, is_rough: false, encoders, computed: None, derived }
     }
 
     /// The bytes of a file of all `frames`, from those of some blocks in some windows. Rough choices begin with `scheme`, and leave
@@ -301,6 +298,14 @@ impl<'a> BlocksCoded<'a> {
         Ok(FIXED_BYTES + bytes * frames as f64 / coded as f64)
     }
 
+    fn new_encoder(&self) -> wavesplat_format::Result<Encoder> {
+        let encoder = Encoder::new(self.input.config.level)?;
+        Ok(match &self.computed {
+            Some(computed) => encoder.measuring(computed.clone()),
+            None => encoder,
+        })
+    }
+
     /// The bytes of all blocks of a tier, if the others are like the coded ones.
     fn bytes_of_tier(
         &self,
@@ -312,8 +317,9 @@ impl<'a> BlocksCoded<'a> {
         let (ids, mut bytes, mut voxels) = (self.ids(job.index, tier), 0.0, 0);
         for ids in ids.chunks(self.plan.room(&job.codec).flight) {
             let blocks = ids.iter().map(|id| reader.gather(window, job, *id)).collect::<Result<_>>()?;
-            let level = self.input.config.level;
-            for Encoded { block, derived, .. } in encode_together(level, self.plan, &self.encoders, job, blocks)? {
+            for Encoded { block, derived, .. } in
+                encode_together(|| self.new_encoder(), self.plan, &self.encoders, job, blocks)?
+            {
                 if let (Some(derived), Ok(mut all)) = (derived, self.derived.lock()) {
                     *all = std::mem::take(&mut *all).join(&derived);
                 }

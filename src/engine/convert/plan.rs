@@ -207,7 +207,7 @@ fn check_bound(input: &CodedInput) -> Result<()> {
 }
 
 /// Checks that what is kept means something for these samples.
-fn check_keep(input: &CodedInput) -> Result<()> {
+pub(super) fn check_keep(input: &CodedInput) -> Result<()> {
     let keep = &input.config.keep;
     let wrong = |what: &str| Err(Error::setting("keep", what));
     if Keep::parse(&keep.to_string()).as_ref() != Ok(keep) {

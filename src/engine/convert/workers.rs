@@ -54,7 +54,9 @@ pub(super) fn encode(
             let number = flight.add(plan.room(&window.codec));
             let (ended, encoders) = (ended.clone(), &encoders);
             scope.spawn(move |_| {
-                let coded = catch_unwind(AssertUnwindSafe(|| encode_next(level, plan, encoders, &window, block)));
+                let coded = catch_unwind(AssertUnwindSafe(|| {
+                    encode_next(|| Encoder::new(level), plan, encoders, &window, block)
+                }));
                 let coded = coded.map(|coded| Ok(CodedBlock { window, coded: coded? }));
                 let _ = ended.send(Ended { number, coded }); // fails if the stage has returned with an error
             });
@@ -149,25 +151,25 @@ const OPEN: &str = "a sender that is in scope";
 
 /// Encodes some blocks of a window on all threads.
 pub(super) fn encode_together(
-    level: i32,
+    new: impl Fn() -> wavesplat_format::Result<Encoder> + Sync,
     plan: &Plan<'_>,
     encoders: &Encoders,
     window: &WindowJob,
     blocks: Vec<BlockSamples>,
 ) -> Result<Vec<Encoded>> {
     window.coarse.decode_shared(plan, &window.codec, blocks.iter().map(|block| block.id))?;
-    blocks.into_par_iter().map(|block| encode_next(level, plan, encoders, window, block)).collect()
+    blocks.into_par_iter().map(|block| encode_next(&new, plan, encoders, window, block)).collect()
 }
 
-/// Encodes a block with an encoder that is not in use.
+/// Encodes a block with an encoder that is not in use, or a new one.
 fn encode_next(
-    level: i32,
+    new: impl Fn() -> wavesplat_format::Result<Encoder>,
     plan: &Plan<'_>,
     encoders: &Encoders,
     window: &WindowJob,
     BlockSamples { id, samples }: BlockSamples,
 ) -> Result<Encoded> {
-    let mut encoder = encoders.take().map_or_else(|| Encoder::new(level), Ok).map_err(bug)?;
+    let mut encoder = encoders.take().map_or_else(new, Ok).map_err(bug)?;
     let samples = to_channel(plan.colour_transform, id, samples);
     let encoded = encode_block(&mut encoder, plan, window, id, samples);
     encoders.put(encoder);

@@ -69,6 +69,7 @@ fn words(file: &Metadata) -> String {
         absolute.clone().unwrap_or_else(share)
     };
     match file.bound {
+        Bound::Rms if file.keep().limits_samples() => format!("the error of every sample <= {}", of_range()),
         Bound::Pointwise => format!("the error of every sample <= {}", of_range()),
         Bound::Rms => format!("the rms error of every voxel in every window <= {}", of_range()),
         Bound::Relative { floor: 0.0 } => {

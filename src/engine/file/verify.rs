@@ -11,7 +11,7 @@ use wavesplat_core::base::progress::Progress;
 use wavesplat_core::base::sample::{join_ranges, magnitude};
 use wavesplat_core::codec::bound;
 use wavesplat_core::codec::decode::Block;
-use wavesplat_core::codec::shifts::{ExactSum, allowed_sum};
+use wavesplat_core::codec::shifts::{CompensatedSum, allowed_sum};
 use wavesplat_core::codec::{WindowCodec, lane_groups, load_lanes};
 use wavesplat_core::source::{CHANNELS, ColourWindow, FrameSource, FrameWindow, read_frames};
 use wavesplat_core::wavelet::Lane;
@@ -429,7 +429,7 @@ fn compare(
 /// The errors of the samples of a block in a frame.
 #[derive(Debug, Clone, Copy, Default)]
 struct FrameSum {
-    errors: ExactSum,
+    errors: CompensatedSum,
     samples: usize,
 }
 

@@ -69,9 +69,10 @@ pub(crate) struct ConvertArgs {
     missing: Option<MissingPolicy>,
     /// Keep more than the bound; may be repeated. `range`: no sample beyond the extremes of its window. `sign`: no sample
     /// changes its sign. `side=V,V...`: every sample stays below, at or above these values, so that isosurfaces of them
-    /// have the same pieces and holes. `sum`: sums of frames are those of the source. `difference=E`, `gradient=E`,
-    /// `curl=E`, `divergence=E`, `laplacian=E`: no derivative is off by more. `relative=S@F`: no sample of at least F is
-    /// off by more than a share
+    /// have the same pieces and holes. `sum`: sums of each block and frame are those of the source. `difference=E`:
+    /// changes from frame to frame are off by at most E. `gradient=E`, `laplacian=E`: the same for derivatives in space.
+    /// `curl=E`, `divergence=E`: the same if every component of the vector is converted with it. `relative=S@F`: samples
+    /// of magnitude F or more are off by at most S times their magnitude
     #[arg(long, value_name = "WHAT", value_parser = Keep::parse, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     keep: Vec<Keep>,
     /// A value that means "missing"

@@ -171,21 +171,24 @@ impl<'a> Info<'a> {
     fn results(&self, estimates: &[Estimate]) -> String {
         let unit = self.units.map_or(String::new(), |unit| format!(", in {unit}"));
         let sides = self.keep.sides.iter().map(|value| format!("side {value}"));
-        let names = ["difference", "gradient", "laplacian", "mean", "beyond"].map(String::from);
+        let names = ["difference", "gradient", "laplacian", "mean", "overshoot"].map(String::from);
         let cost = (!self.keep.is_empty()).then(|| "kept bytes".to_string());
         let columns = names.into_iter().chain(sides).chain(cost).map(|name| format!(" {name:>11}")).collect::<String>();
         let mut text = format!(
-            "results    errors without --keep: root mean square, as a share of the result's; mean of a frame of a block, and beyond its \
-             extremes: at most{unit}"
+            "errors     of what is computed, without --keep\n           \
+             difference (between frames), gradient, laplacian: root mean square, as a share of its own\n           \
+             mean, overshoot: the largest of a block and frame{unit}\n"
         );
-        text += if self.keep.sides.is_empty() { "\n" } else { "; side: edges that the surface crosses wrongly\n" };
+        if !self.keep.sides.is_empty() {
+            text += "           side V: edges that cross V in only one of source and decoded samples, as a share of those in the source\n";
+        }
         let _ = writeln!(text, "{:>20}{columns}", "tolerance");
         let percent = |share: &Option<f64>| share.map_or("-".into(), |share| format!("{:.2} %", 100.0 * share));
         for Estimate { tolerance, results, kept_bytes, .. } in estimates {
             let Some(results) = results else { return String::new() };
             let shares = [&results.difference, &results.gradient, &results.laplacian].map(percent).into_iter();
             let cells = shares
-                .chain([results.mean, results.beyond].map(|error| format!("{error:.2e}")))
+                .chain([results.mean, results.overshoot].map(|error| format!("{error:.2e}")))
                 .chain(results.sides.iter().map(percent));
             let cells = cells.chain(kept_bytes.map(|bytes| bytes.to_string())).map(|cell| format!(" {cell:>11}"));
             let _ = writeln!(text, "{tolerance:>20}{}", cells.collect::<String>());

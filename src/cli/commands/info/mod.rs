@@ -31,7 +31,7 @@ pub(crate) struct InfoArgs {
     /// five tolerances if none is given]
     #[arg(long, value_name = "X", value_parser = tolerance, num_args = 0..=1)]
     estimate: Option<Option<f64>>,
-    /// With --estimate: also with what samples keep, as for convert
+    /// With --estimate: also the bytes with this --keep, as for convert
     #[arg(long, value_name = "WHAT", value_parser = Keep::parse, allow_hyphen_values = true, requires = "estimate")]
     keep: Vec<Keep>,
     #[command(flatten)]

@@ -72,9 +72,10 @@ def convert(
             NaN by "mask", or that number.
         keep: What samples keep besides the bound, as words with spaces between them: "range", none is beyond the extremes of
             its window; "sign", none changes its sign; "side=0.5,2", each stays below, at or above these values, so that their
-            isosurfaces have the same pieces and holes; "sum", sums of frames are those of the source; "difference=E",
-            "gradient=E", "curl=E", "divergence=E" and "laplacian=E", no derivative is off by more; "relative=S@F", no sample
-            of at least F is off by more than a share.
+            isosurfaces have the same pieces and holes; "sum", sums of each block and frame are those of the source;
+            "difference=E", changes from frame to frame are off by at most E; "gradient=E" and "laplacian=E", the same for
+            derivatives in space; "curl=E" and "divergence=E", the same if every component of the vector is converted with it;
+            "relative=S@F", samples of magnitude F or more are off by at most S times their magnitude.
         variable: Which variable of a Dataset; all that have three axes by default.
         axes: What each axis of a Dataset's variable counts, slowest first, in letters of "tzyx" ("c" for another); by
             default that follows from names, attributes and order.
