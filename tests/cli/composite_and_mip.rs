@@ -89,6 +89,10 @@ fn surfaces_are_named_by_value_or_share() {
     let seen = |light: &[f32]| light.chunks(4).filter(|p| p[3] > 0.4).count();
     assert!(seen(&one) > 20 && seen(&one).abs_diff(seen(&red)) < 60, "{} {}", seen(&one), seen(&red));
     assert!(work.render(&format!("{shown} --iso 1e9 -o far.npy")).ok().err.contains("no sample reaches it"));
+    work.wavesplat("convert a.npy -o kept.wspl --keep side=1").ok();
+    let kept = work.render(&format!("kept.wspl --frames 2 {SIZE} --range 0,2 --iso 1,0.5 -o kept.npy")).ok().err;
+    assert!(kept.contains(" 1: every sample"), "{kept}");
+    assert!(!kept.contains("0.5: every sample"), "{kept}");
     let json = work.render(&format!("{shown} --iso 0.5,1:00ff00 -o two.png --json")).ok().json();
     let iso = json["picture"]["iso"].as_str().unwrap().to_string();
     assert!(iso.starts_with("0.5:") && iso.ends_with("1:00ff00:0.6"), "{iso}");

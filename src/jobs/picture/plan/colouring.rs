@@ -174,7 +174,7 @@ pub(in crate::picture) fn automatic_colours(
     Ok(Some(colours))
 }
 
-/// Says which surfaces no sample of the file reaches.
+/// Says which surfaces no sample of the file reaches, and which have all samples on the source's sides.
 pub(in crate::picture) fn note_surfaces(
     config: &RenderConfig,
     file: Option<&CoefficientFile>,
@@ -185,6 +185,13 @@ pub(in crate::picture) fn note_surfaces(
     for surface in surfaces.iter().filter(|surface| !(lo..=hi).contains(&surface.value)) {
         let value = surface.value;
         reporter.note(format_args!("`iso` {value}: no sample reaches it; they are from {lo:.4e} to {hi:.4e}"));
+    }
+    let kept = if file.keeps_sides() { file.metadata().keep().sides } else { Vec::new() };
+    for surface in surfaces.iter().filter(|surface| kept.contains(&surface.value)) {
+        let value = surface.value;
+        reporter.note(format_args!(
+            "`iso` {value}: every sample is on the source's side of it, so the surface among samples has the source's pieces and holes"
+        ));
     }
 }
 
