@@ -70,6 +70,6 @@ pub use recovery::{Recovered, Recovery};
 pub use sample::SampleType;
 pub use sides::{Side, SideCodes, SideSet, pack_sides, unpack_sides};
 pub use storage::Storage;
-pub use sums::{SumCodes, pack_sums, unpack_sums};
+pub use sums::{SumCodes, most_unshifted, pack_sums, unpack_sums};
 pub use window::{Basis, Window, WindowEnd, WindowRecord};
 pub use writer::{Summary, Writer};

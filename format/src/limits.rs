@@ -21,7 +21,7 @@ pub const MAX_LISTED: usize = 1 << 16;
 /// Kept values of a file: samples stay below, at or above each.
 pub const MAX_SIDES: usize = 16;
 
-/// Parts of one block: every level, outliers, missing samples, exact samples, sides.
+/// Parts of one block: every level, outliers, missing samples, exact samples, sides, sums.
 pub const MAX_PARTS: usize = MAX_LEVELS + 4;
 
 /// Frames in one window: 1024, plus one for bases that need an odd number. A basis as a matrix stays near 8 MiB.

@@ -54,6 +54,7 @@ pub fn unpack_sums(raw: &[u8], frames: usize, samples: usize) -> Result<SumCodes
     while !gaps.is_empty() {
         let sample = take_varint(&mut gaps)?.saturating_add(next);
         ensure(sample < samples, || format!("sample {sample} of {samples}"))?;
+        ensure(unshifted.len() < most_unshifted(samples), || "too many samples stay unshifted".into())?;
         unshifted.push(sample as u32);
         next = sample + 1;
     }
@@ -64,9 +65,14 @@ pub fn unpack_sums(raw: &[u8], frames: usize, samples: usize) -> Result<SumCodes
     Ok(codes)
 }
 
+/// The most samples of a block of so many that stay unshifted.
+pub fn most_unshifted(samples: usize) -> usize {
+    samples / 4
+}
+
 /// The most bytes of the payload for so many frames and samples: a gap takes at most 5.
 pub(crate) fn max_sums(frames: usize, samples: usize) -> usize {
-    8 + 8 * frames + 5 * samples
+    8 + 8 * frames + 5 * most_unshifted(samples)
 }
 
 #[cfg(test)]

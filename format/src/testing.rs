@@ -102,7 +102,7 @@ fn content(geometry: &BlockGeometry<'_>, random: &mut Random) -> Content {
         found.sums = is_nested.then(|| SumCodes {
             unit: 0.25,
             frames: frames.map(|t| 7 - 300 * t).collect(),
-            unshifted: (0..total as u32).step_by(5).collect(),
+            unshifted: (0..total as u32 / 4).step_by(5).collect(),
         });
     }
     found

@@ -559,7 +559,7 @@ def check_part(p, w: Window, tier: int, size: tuple[int, ...], s: int, place: st
         fits = p.raw <= MAX_SIDES * (13 + 3 * samples + 8)
     elif p.kind == SUMS:
         most = w.frames
-        fits = p.raw <= 8 + 8 * w.frames + 5 * samples
+        fits = p.raw <= 8 + 8 * w.frames + 5 * (samples // 4)
     elif p.level == 1:
         cells = math.prod(cells_of((*size, w.frames)))
         longest = 8 + s * min(MAX_LISTED, samples) + lattice_most(cells, samples)
@@ -674,7 +674,7 @@ def add_to_sums(out: np.ndarray, data: bytes, p, frames: int, place: str) -> np.
     while r.at < len(data):
         unshifted.append(before + take_number(r))
         before = unshifted[-1] + 1
-    need(before <= len(out), place, "a sample is not in the block")
+    need(before <= len(out) and len(unshifted) <= len(out) // 4, place, "a sample is not in the block, or too many")
     old, out = out, out.reshape(frames, n).copy()
     stride = next(m for m in range(n * 618 // 1000 + 1, 2 * n + 2) if math.gcd(m, n) == 1)
     rank = np.arange(n) * stride % n

@@ -11,10 +11,10 @@ use super::load::Source;
 use super::refine::Coded;
 use super::shifts::{CompensatedSum, FrameRun, RUN, add_shifts, allowed_sum, spacing};
 use super::sides::SidesOf;
-use crate::base::sample::{self, SampleType};
+use crate::base::sample::{self, SampleType, join_ranges};
 use crate::base::vectors::dispatch;
 use crate::wavelet::LANES;
-use wavesplat_format::SumCodes;
+use wavesplat_format::{SumCodes, most_unshifted};
 
 /// A block whose sums are to be kept, as it is decoded without that.
 struct Unbalanced<'a> {
@@ -34,6 +34,8 @@ struct Frame<'a> {
     fixed: &'a [bool],
     /// As a reader returns them.
     samples: Vec<f64>,
+    /// The range of the samples before they go to their sides; readers clamp to the range of the window's.
+    unsided: (f64, f64),
     codes: SumCodes,
 }
 
@@ -60,7 +62,11 @@ impl Source<'_> {
             frame.tally(self, number, &mut tally);
         }
         coded.tally = tally.with_splatted(&coded.tally);
-        all.is_valid().then_some(all)
+        if self.codec.scheme.pyramid.is_some() {
+            coded.dropped = coded.tally.squared_error; // what is not coded is the error
+        }
+        let is_possible = all.is_valid() && all.unshifted.len() <= most_unshifted(self.samples.len());
+        is_possible.then_some(all)
     }
 }
 
@@ -78,12 +84,14 @@ impl<'a> Unbalanced<'a> {
     fn empty_frame(&self) -> Frame<'_> {
         let numbers = vec![0.0; self.of.voxels()];
         let codes = SumCodes { unit: self.unit, frames: vec![0], unshifted: Vec::new() };
-        Frame { source: numbers.clone(), decoded: &[], fixed: &[], samples: numbers, codes }
+        Frame { source: numbers.clone(), decoded: &[], fixed: &[], samples: numbers, unsided: NOTHING, codes }
     }
 
     fn load<'b>(&'b self, number: usize, frame: &mut Frame<'b>) {
         let (voxels, each) = (frame.source.len(), frame.source.len() * self.of.codec.sample.size());
         sample::load(self.of.codec.sample, &self.source[number * each..][..each], &mut frame.source);
+        let missing = frame.source.iter_mut().enumerate().filter(|(at, _)| self.of.missing.has(number * voxels + at));
+        missing.for_each(|(_, source)| *source = 0.0);
         (frame.decoded, frame.fixed) =
             (&self.decoded[number * each..][..each], &self.fixed[number * voxels..][..voxels]);
         frame.codes.unshifted.clear();
@@ -143,6 +151,7 @@ impl<'a> Unbalanced<'a> {
     fn sum(&self, frame: &mut Frame<'_>) -> f64 {
         let (codec, voxels, mut sum) = (self.of.codec, frame.source.len(), CompensatedSum::default());
         let (ty, mut bytes) = (codec.sample, [0; RUN * size_of::<f64>()]);
+        frame.unsided = NOTHING;
         for first in (0..voxels).step_by(RUN) {
             let count = RUN.min(voxels - first);
             let bytes = &mut bytes[..count * ty.size()];
@@ -153,6 +162,8 @@ impl<'a> Unbalanced<'a> {
             }
             let (samples, source) = (&mut frame.samples[first..][..count], &frame.source[first..][..count]);
             sample::load(ty, bytes, samples);
+            let unsided = samples.iter().zip(&frame.fixed[first..]).filter(|(_, fixed)| !**fixed);
+            frame.unsided = unsided.fold(frame.unsided, |range, (sample, _)| join_ranges(range, (*sample, *sample)));
             self.sides.place(source, samples);
             let fixed = frame.fixed[first..][..count].iter().enumerate().filter(|(_, fixed)| **fixed);
             fixed.for_each(|(at, _)| samples[at] = source[at]);
@@ -178,6 +189,9 @@ fn sum_of_errors(samples: &[f64], source: &[f64]) -> f64 {
     }
     sums.iter().sum::<f64>() + last.iter().zip(of_last).map(|(sample, source)| sample - source).sum::<f64>()
 }
+
+/// The range of no samples.
+const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
 /// Rounds in which samples of a frame turn out to leave their bound.
 const TRIES: usize = 30;
@@ -209,6 +223,7 @@ impl Frame<'_> {
     /// Adds the samples of the frame to a tally.
     fn tally(&self, of: &Source<'_>, number: usize, tally: &mut Tally) {
         let (codec, place) = (of.codec, number * self.source.len());
+        (tally.min, tally.max) = join_ranges((tally.min, tally.max), self.unsided);
         for (first, [samples, sources]) in self.rows() {
             let stats = row_stats(samples, sources);
             if of.missing.count == 0 && is_clear(codec, &stats) {

@@ -75,6 +75,9 @@ fn length_down((lo, hi): (f64, f64)) -> f64 {
 /// `a` times `b`, neither negative, rounded down if it is not exact.
 fn product_down(a: f64, b: f64) -> f64 {
     let product = a * b;
+    if a == 1.0 {
+        return product;
+    }
     let rounded_up = a.mul_add(b, -product) < 0.0 || product < UNDERFLOW;
     if rounded_up { product.next_down().max(0.0) } else { product }
 }

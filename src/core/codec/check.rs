@@ -239,7 +239,8 @@ impl Tally {
     pub(super) fn with_splatted(self, splatted: &Self) -> Self {
         let (min, max) = (self.min.min(splatted.min), self.max.max(splatted.max));
         let (reached, share) = (self.reached.max(splatted.reached), self.share.max(splatted.share));
-        Self { min, max, reached, share, ..self }
+        let squared_error = self.squared_error.max(splatted.squared_error);
+        Self { min, max, reached, share, squared_error, ..self }
     }
 
     /// Takes the samples that must be stored exactly.

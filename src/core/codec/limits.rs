@@ -54,7 +54,10 @@ fn largest_error(of: DerivativeBound, dims: [usize; 3], spacing: [f64; 3]) -> f6
         Derivative::Divergence => steps.iter().sum(),
         Derivative::Laplacian => steps.iter().map(|step| 4.0 * step * step).sum(),
     };
-    if sum > 0.0 { of.error / sum * DOWN } else { f64::INFINITY }
+    match sum > 0.0 || of.error == 0.0 && !steps.is_empty() {
+        true => (of.error / sum * DOWN).max(0.0), // not NaN
+        false => f64::INFINITY,
+    }
 }
 
 /// A factor that covers the rounding of a few operations.

@@ -131,8 +131,9 @@ impl SchemeSelector<'_> {
 
     /// Whether 32-bit floats are precise enough.
     pub(super) fn single(&self) -> bool {
-        let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&self.promise.delta) && self.magnitude < MOST_SINGLE;
-        normal && self.promise.delta >= self.magnitude * SINGLE
+        let error = self.promise.allowed(self.magnitude);
+        let normal = (LEAST_SINGLE..MOST_SINGLE).contains(&error) && self.magnitude < MOST_SINGLE;
+        normal && error >= self.magnitude * SINGLE
     }
 
     /// The first coarseness to try. Under a bound of the mean, steps leave a budget for dropped coefficients

@@ -281,7 +281,7 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let workers = rayon::current_num_threads();
     let threads = |room: &Room| room.flight.min(workers);
     let copies = if config.keep.sum { 3 } else { 2 * usize::from(!config.keep.sides.is_empty()) };
-    let mended = copies * raw + if config.keep.sum { samples + voxels * size_of::<f64>() } else { 0 };
+    let mended = copies * raw + if config.keep.sum { 3 * samples + 2 * voxels * size_of::<f64>() } else { 0 };
     let begin = above / 4; // the known nodes of a block: an eighth of its nodes, and more at its faces
     let scratch = samples + 2 * codes + field + raw + channel_bytes + mended + begin + above + ZSTD_SCRATCH;
     // The blocks above and two lists of blocks that wait; vectors grow to twice their length.

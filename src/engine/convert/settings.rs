@@ -55,6 +55,7 @@ impl ConvertConfig {
             Some(value) if colours.is_some() => Some(number(value)?),
             _ => file.missing_value,
         };
+        named(Keep::SETTING).map_or(Some(()), |words| Keep::parse(words).ok().map(drop))?; // not those of a later version
         Some(Self {
             coding: SchemeConstraint { basis, space },
             chain: named("chain").map_or(Some(CHAIN), number)?,

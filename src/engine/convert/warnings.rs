@@ -101,6 +101,9 @@ fn small_changes(config: &ConvertConfig, report: &ConvertReport, median: Option<
     if error <= median {
         return None;
     }
+    if config.keep.limits_samples() {
+        return None; // the error is not the tolerance's
+    }
     let share = config.tolerance / error * (median / 10.0);
     let is_share = config.max_error.is_none() && share >= LEAST_SHARE;
     let (field, value) = if is_share { ("tolerance", share) } else { ("max_error", median / 10.0) };

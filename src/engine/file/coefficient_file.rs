@@ -252,7 +252,8 @@ impl CoefficientFile {
     pub fn block_bytes(&self) -> usize {
         let payload = 5;
         let refined = payload + size_of::<i32>() + self.coefficient_size();
-        self.largest_block() * (refined + 1 + self.sample().size()) + self.bytes_to_begin(refined)
+        let unshifted = if self.metadata().keep().sum { 2 } else { 0 }; // a quarter of the samples, in lists that grow
+        self.largest_block() * (refined + 1 + self.sample().size() + unshifted) + self.bytes_to_begin(refined)
     }
 
     /// The window that holds a frame; the last one for frames past the end.

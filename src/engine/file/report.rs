@@ -62,14 +62,17 @@ fn words(file: &Metadata) -> String {
     let (tolerance, (lo, hi)) = (file.tolerance, range_of_shares(file));
     let amount = |error: f64| unit(file).map_or(format!("{error:e}"), |unit| format!("{error:e} {unit}"));
     let largest = largest_bound(file);
-    let absolute = max_error(file).map(|error| amount(if largest < error { rounded(largest) } else { error }));
+    let is_limited = !file.windows.is_empty();
+    let absolute = max_error(file).map(|error| amount(if is_limited { rounded(largest).min(error) } else { error }));
     let largest = amount(rounded(largest));
     let of_range = || {
         let share = || format!("{tolerance:e} x range ({lo:.4e} to {hi:.4e}), at most {largest}");
         absolute.clone().unwrap_or_else(share)
     };
     match file.bound {
-        Bound::Rms if file.keep().limits_samples() => format!("the error of every sample <= {}", of_range()),
+        Bound::Rms | Bound::Sampled { .. } if file.keep().limits_samples() => {
+            format!("the error of every sample <= {}", of_range())
+        }
         Bound::Pointwise => format!("the error of every sample <= {}", of_range()),
         Bound::Rms => format!("the rms error of every voxel in every window <= {}", of_range()),
         Bound::Relative { floor: 0.0 } => {

@@ -397,7 +397,9 @@ fn compare(
             first_not_kept = first_not_kept.or(Some(place(i / voxels, i % voxels)));
         }
         of_source = join_ranges(of_source, (source, source));
-        sums[i / voxels].add(extracted - source);
+        if codec.sums {
+            sums[i / voxels].add(extracted - source);
+        }
         Some((codec.error(splatted[i], extracted, source), codec.bound.allowed(source)))
     };
     let lanes = vec![Lane::default(); codec.frames()];

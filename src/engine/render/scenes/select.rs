@@ -11,6 +11,7 @@ use crate::render::report::LeftOut;
 use std::collections::BTreeMap;
 use wavesplat_core::base::grid::Grid;
 use wavesplat_core::base::sample::magnitude;
+use wavesplat_core::base::sample::{self, SampleType};
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_format::{Basis, BlockEntry, BlockStats, PartEntry, PartKind};
 
@@ -49,6 +50,8 @@ pub(super) struct BlockSelector {
     /// The largest sum of absolute terms of a series whose samples are at most 1; none if the functions are not orthonormal.
     norm_of_ones: Option<f64>,
     frames: usize,
+    /// The type of the samples, if values go to the side of a kept value on which their samples are.
+    sided: Option<SampleType>,
     pub(super) rule: Rule,
 }
 
@@ -147,7 +150,8 @@ impl BlockSelector {
             Basis::Haar | Basis::Learned => Some((frames as f64).sqrt()),
             Basis::Multi => None,
         };
-        Self { gains, largest_gain, energy_gain, alike, cumulative, tiers, above, norm_of_ones, frames, rule }
+        let sided = (!codec.sides.is_empty()).then_some(codec.sample);
+        Self { gains, largest_gain, energy_gain, alike, cumulative, tiers, above, norm_of_ones, frames, sided, rule }
     }
 
     /// The parts of a block to read: all but those that the rule leaves out. If zeros are within the limit, only the
@@ -198,7 +202,7 @@ impl BlockSelector {
         let mut without = Alternative::default();
         for part in levels(block.entry) {
             let more = self.with(without, &part, block);
-            if (block.entry.stats.reached + more.largest).next_up() <= allowed {
+            if self.certified(block, more.largest) <= allowed {
                 self.leave_out(&part, more, block, kept);
                 without = more;
             } else if self.cumulative {
@@ -209,14 +213,25 @@ impl BlockSelector {
 
     /// Leaves out a part. `without` is the change caused by all left-out parts, this one included.
     fn leave_out(&self, part: &LevelPart, without: Alternative, block: &BlockView<'_>, kept: &mut KeptParts) {
-        kept.certified = (block.entry.stats.reached + without.largest).next_up();
+        kept.certified = self.certified(block, without.largest);
+        kept.errors[0] = self.certified(block, 0.0);
         kept.expected = self.own(block) + without.change;
         if self.cumulative {
             kept.errors[1..].fill(0.0);
         }
         kept.errors[1 + part.level] = part.entry.stats.largest;
-        // Sides say how fully decoded samples change.
-        kept.entry.parts.retain(|p| p.kind != part.entry.kind && p.kind != PartKind::Sides);
+        // Sides and sums say how fully decoded samples change.
+        let changes = [part.entry.kind, PartKind::Sides, PartKind::Sums];
+        kept.entry.parts.retain(|p| !changes.contains(&p.kind));
+    }
+
+    /// The error of samples that leaving out parts changes by at most `largest`. Values beside a kept value become samples, rounded to their
+    /// type.
+    fn certified(&self, block: &BlockView<'_>, largest: f64) -> f64 {
+        let stats = &block.entry.stats;
+        let magnitude = magnitude((stats.min, stats.max)) + stats.reached + largest;
+        let rounding = self.sided.map_or(0.0, |ty| sample::rounding(ty, magnitude));
+        (stats.reached + largest + rounding).next_up()
     }
 
     /// The change caused by the parts of `without` and one more part.
