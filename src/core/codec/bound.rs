@@ -8,7 +8,7 @@
 //! rms          sqrt(mean over the present frames of a window of (v^ - v)^2) <= delta                      (eq 23)
 //! ```
 //!
-//! `--keep` may limit single samples further ([`limits`](super::limits), eq 47).
+//! `--keep` may limit single samples further ([`SampleLimits`], eq 47).
 //!
 //! The weights w_i of the voxels at a pixel are positive (eq 3). So eq 21 bounds every pixel of every view, by the
 //! triangle inequality:
