@@ -238,10 +238,12 @@ impl ErrorBound {
         for ((sum, e), value) in sums.iter_mut().zip(errors).zip(values) {
             match self.form() {
                 Form::Same => *sum = if *e > *sum { *e } else { *sum },
-                Form::Mean => *sum += e * e,
+                Form::Mean => *sum += e * e + if *e > 0.0 { f64::MIN_POSITIVE } else { 0.0 }, // never 0 by underflow
                 Form::Varying => {
                     let allowed = self.about_allowed(*value);
-                    let share = if *e > 0.0 { e / allowed } else { 0.0 };
+                    let used = e / allowed;
+                    let used = if used < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { used }; // never 0 by underflow
+                    let share = if *e > 0.0 { used } else { 0.0 };
                     *sum = if share > *sum { share } else { *sum };
                 }
             }
@@ -400,6 +402,17 @@ mod tests {
             let found = ((whole as u128) << 53) + (rest / unit) as u128;
             prop_assert!(found <= truth, "{found} {truth}");
             prop_assert!(truth - found <= truth >> 51, "{found} {truth}");
+        }
+
+        /// Errors so small that their share underflows use some of the bound.
+        #[test]
+        fn an_error_uses_some_of_a_bound(value in 1.0..1e300_f64, tolerance in 0.01..1.0, error in 1..1_u64 << 60) {
+            for kind in [Bound::Pointwise, Bound::Rms, Bound::Relative { floor: 0.0 }] {
+                let bound = ErrorBound::new(kind, tolerance, 1e10);
+                let mut sums = [0.0];
+                bound.add(&[f64::from_bits(error)], &[value], &mut sums);
+                prop_assert!(bound.largest_share(&sums, 1) > 0.0);
+            }
         }
 
         /// The vector code's share is at least the exact share, and close to it.
