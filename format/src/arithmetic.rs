@@ -17,8 +17,7 @@ impl Chance {
     /// Both bits are equally likely.
     pub const EVEN: Self = Self { of_zero: 1 << 15, shift: 1 };
 
-    /// Learns from a bit, of which the first of a kind count most. Returns the length of the bit's part of an interval, which is divided at
-    /// `bound`.
+    /// Learns from a bit; the first bits of a kind count most. Returns the length of the bit's part of an interval that is divided at `bound`.
     fn learn(&mut self, bit: bool, bound: u32, range: u32) -> u32 {
         if bit {
             self.of_zero -= self.of_zero >> self.shift;

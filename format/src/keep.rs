@@ -25,9 +25,9 @@ pub enum Derivative {
     Difference,
     /// The derivatives along x, y and z.
     Gradient,
-    /// The curl of a vector of which each component keeps it.
+    /// The curl of a vector, if each of its components keeps this.
     Curl,
-    /// The divergence of a vector of which each component keeps it.
+    /// The divergence of a vector, if each of its components keeps this.
     Divergence,
     /// The sum of the second derivatives along x, y and z.
     Laplacian,

@@ -77,7 +77,7 @@ fn share(trial: &Trial, places: impl Iterator<Item = usize>) -> f64 {
     let frames = present.len() as f64;
     let keep = trial.file.metadata().keep();
     let limits = |v: f64| keep.relative.filter(|of| v.abs() >= of.floor).map_or(f64::MAX, |of| of.share * v.abs());
-    let is_limited = keep.sum || keep.relative.is_some() || !keep.derivatives.is_empty();
+    let is_limited = keep.limits_samples();
     let errors = present.into_iter().map(|at| (trial.source[at], (trial.found[at] - trial.source[at]).abs()));
     match trial.case.bound {
         Bound::Relative { floor } => {

@@ -9,7 +9,7 @@ use super::check::{RowStats, Tally};
 use super::field::Field;
 use super::load::Source;
 use super::refine::Coded;
-use super::shifts::{CompensatedSum, FrameRun, RUN, add_shifts, allowed_sum, spacing};
+use super::shifts::{CompensatedSum, FrameRun, RUN, allowed_sum, shift_and_clip, spacing};
 use super::sides::SidesOf;
 use crate::base::sample::{self, SampleType, join_ranges};
 use crate::base::vectors::dispatch;
@@ -34,7 +34,7 @@ struct Frame<'a> {
     fixed: &'a [bool],
     /// As a reader returns them.
     samples: Vec<f64>,
-    /// The range of the samples before they go to their sides; readers clamp to the range of the window's.
+    /// The range of the samples before they go to their sides, if some may: readers clamp to the range of the window's.
     unsided: (f64, f64),
     codes: SumCodes,
 }
@@ -156,15 +156,15 @@ impl<'a> Unbalanced<'a> {
             let count = RUN.min(voxels - first);
             let bytes = &mut bytes[..count * ty.size()];
             bytes.copy_from_slice(&frame.decoded[first * ty.size()..][..count * ty.size()]);
-            add_shifts(ty, &frame.codes, FrameRun { frame: 0, first, voxels }, bytes);
-            if let Some((lo, hi)) = codec.clip {
-                sample::clip(ty, lo, hi, bytes);
-            }
+            shift_and_clip(codec, Some(&frame.codes), FrameRun { frame: 0, first, voxels }, bytes);
             let (samples, source) = (&mut frame.samples[first..][..count], &frame.source[first..][..count]);
             sample::load(ty, bytes, samples);
-            let unsided = samples.iter().zip(&frame.fixed[first..]).filter(|(_, fixed)| !**fixed);
-            frame.unsided = unsided.fold(frame.unsided, |range, (sample, _)| join_ranges(range, (*sample, *sample)));
-            self.sides.place(source, samples);
+            if !codec.sides.is_empty() {
+                let unsided = samples.iter().zip(&frame.fixed[first..]).filter(|(_, fixed)| !**fixed);
+                frame.unsided =
+                    unsided.fold(frame.unsided, |range, (sample, _)| join_ranges(range, (*sample, *sample)));
+                self.sides.place(source, samples);
+            }
             let fixed = frame.fixed[first..][..count].iter().enumerate().filter(|(_, fixed)| **fixed);
             fixed.for_each(|(at, _)| samples[at] = source[at]);
             if ty == SampleType::F64 {
@@ -227,7 +227,7 @@ impl Frame<'_> {
         for (first, [samples, sources]) in self.rows() {
             let stats = row_stats(samples, sources);
             if of.missing.count == 0 && is_clear(codec, &stats) {
-                tally.add_row(&stats, codec.bound.delta);
+                tally.add_row(&stats, codec.bound.largest_share(&[stats.largest], 1));
                 continue;
             }
             for (at, (sample, source)) in samples.iter().zip(sources).enumerate() {

@@ -62,7 +62,7 @@ pub(super) struct Ranges {
     pub(super) squares: f64,
 }
 
-/// What the samples of a row show.
+/// What some samples show.
 pub(super) struct RowStats {
     pub(super) min: f64,
     pub(super) max: f64,
@@ -156,13 +156,11 @@ impl Tally {
         self.unclear = unclear;
     }
 
-    /// Adds the statistics of samples that are clearly within the bound, and their share.
+    /// As [`Self::add_row`], of one series.
     fn add_lane(&mut self, stats: &LaneStats, lane: usize, share: f64) {
-        let largest = if stats.largest[lane] > 0.0 { stats.largest[lane].next_up() } else { 0.0 };
-        self.reached = self.reached.max(largest);
-        self.share = self.share.max(share);
-        self.squared_error += stats.squares[lane];
-        (self.min, self.max) = (self.min.min(stats.lo[lane]), self.max.max(stats.hi[lane]));
+        let (min, max) = (stats.lo[lane], stats.hi[lane]);
+        let row = RowStats { min, max, largest: stats.largest[lane], squares: stats.squares[lane] };
+        self.add_row(&row, share);
     }
 
     /// Adds those of the first `count` series that are clearly within the bound and have no missing sample. This is
@@ -226,11 +224,11 @@ impl Tally {
         is_within
     }
 
-    /// Adds a row of samples that are within the bound, which is the same for all.
-    pub(super) fn add_row(&mut self, row: &RowStats, delta: f64) {
+    /// Adds the statistics of samples that are clearly within the bound, and their share.
+    pub(super) fn add_row(&mut self, row: &RowStats, share: f64) {
         let largest = if row.largest > 0.0 { row.largest.next_up() } else { 0.0 };
         self.reached = self.reached.max(largest);
-        self.share = self.share.max(share(largest, delta));
+        self.share = self.share.max(share);
         self.squared_error += row.squares;
         (self.min, self.max) = (self.min.min(row.min), self.max.max(row.max));
     }

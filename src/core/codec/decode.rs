@@ -9,7 +9,7 @@ use super::buffer::Buffer;
 use super::codes::Codes;
 use super::field::{Above, Field, LONG_RUN, Plane, RUN, Stored};
 use super::rows::Change;
-use super::shifts::{FrameRun, add_shifts};
+use super::shifts::{self, FrameRun, shift_and_clip};
 use crate::base::grid::Region;
 use crate::base::sample::{self, SampleType};
 use crate::wavelet;
@@ -419,8 +419,9 @@ impl Block {
                 }
                 _ => bytes.fill([0; 4]),
             }
+            let run = FrameRun::of(frame * self.voxels, self.voxels);
+            shift_and_clip(codec, None, run, bytes.as_flattened_mut());
         }
-        self.clip(codec, frames, &mut out);
         self.put_overrides(4, &mut out);
         out
     }
@@ -452,7 +453,6 @@ impl Block {
                     visit(at, values);
                     self.store(codec, at, values, &mut out[at * size..(at + values.len()) * size]);
                 });
-                self.clip(codec, &wanted.frames, &mut out);
             }
         }
         self.put_overrides(size, &mut out);
@@ -460,19 +460,9 @@ impl Block {
         out
     }
 
-    /// Stores some voxels' samples of a frame, from the sample `at` on, so that sums are kept.
+    /// Stores some voxels' samples of a frame, from the sample `at` on, before outliers and missing samples are in place.
     pub(super) fn store(&self, codec: &WindowCodec, at: usize, values: &[f64], out: &mut [u8]) {
-        sample::store(codec.sample, values, out);
-        if let Some(sums) = &self.sums {
-            add_shifts(codec.sample, sums, FrameRun::of(at, self.voxels), out);
-        }
-    }
-
-    /// Keeps decoded samples within the extremes of the source, if the file says so. Those are samples themselves.
-    fn clip(&self, codec: &WindowCodec, frames: &[usize], samples: &mut [u8]) {
-        let Some((lo, hi)) = codec.clip else { return };
-        let each = self.voxels * codec.sample.size();
-        frames.iter().for_each(|frame| sample::clip(codec.sample, lo, hi, &mut samples[frame * each..][..each]));
+        shifts::store(codec, self.sums.as_ref(), FrameRun::of(at, self.voxels), values, out);
     }
 
     /// Replaces samples by outliers and missing samples.

@@ -47,6 +47,10 @@ pub struct Crossings {
 }
 
 impl Crossings {
+    fn join(self, other: Self) -> Self {
+        Self { crossed: self.crossed + other.crossed, changed: self.changed + other.changed }
+    }
+
     /// The edges that it crosses in only one of source and decoded samples, as a share of those that it crosses in the source; `None` if
     /// it crosses none.
     pub fn share(self) -> Option<f64> {
@@ -54,7 +58,7 @@ impl Crossings {
     }
 }
 
-/// How far results are off in some blocks.
+/// Errors of what is computed from the samples of some blocks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct DerivedErrors {
     /// Differences between frames.
@@ -164,18 +168,13 @@ impl DerivedErrors {
     pub fn join(self, other: &Self) -> Self {
         let longest = self.crossings.len().max(other.crossings.len());
         let at = |of: &[Crossings], i: usize| of.get(i).copied().unwrap_or_default();
-        let both = (0..longest).map(|i| (at(&self.crossings, i), at(&other.crossings, i)));
-        let add = |(a, b): (Crossings, Crossings)| Crossings {
-            crossed: a.crossed + b.crossed,
-            changed: a.changed + b.changed,
-        };
         Self {
             difference: self.difference.join(other.difference),
             gradient: self.gradient.join(other.gradient),
             laplacian: self.laplacian.join(other.laplacian),
             mean: self.mean.max(other.mean),
             overshoot: self.overshoot.max(other.overshoot),
-            crossings: both.map(add).collect(),
+            crossings: (0..longest).map(|i| at(&self.crossings, i).join(at(&other.crossings, i))).collect(),
         }
     }
 }

@@ -50,7 +50,7 @@ pub struct Encoded {
     pub block: EncodedBlock,
     /// The largest share of a series, rounded up: its error divided by its bound.
     pub share: f64,
-    /// How far results are off, as coefficients give the samples, if that is [measured](Encoder::measuring).
+    /// Errors of what is computed from the decoded samples, if they are [measured](Encoder::measuring).
     pub derived: Option<DerivedErrors>,
 }
 
@@ -60,7 +60,7 @@ impl Encoder {
         Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new(), computed: None })
     }
 
-    /// The encoder, which also measures how far results are off.
+    /// The encoder, which also measures the errors of what is computed.
     pub fn measuring(self, computed: Computed) -> Self {
         Self { computed: Some(computed), ..self }
     }

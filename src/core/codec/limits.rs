@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_errors_of_samples_are_the_promised_errors_of_stencils() {
+    fn the_worst_errors_of_samples_are_the_promised_errors_of_derivatives() {
         let spacings = [[1.0; 3], [0.1, 0.3, 7.0], [1e-3, 2.0, 1.1e-3], [5.0, 1e9, 1e-9]];
         for (derivative, spacing) in
             Derivative::ALL.into_iter().flat_map(|derivative| spacings.map(|s| (derivative, s)))

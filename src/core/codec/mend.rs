@@ -1,4 +1,4 @@
-//! Moves the decoded samples of a block to what its file keeps besides the bound.
+//! Finds the changes of a block's decoded samples by which they keep what the file promises besides the bound.
 
 use super::WindowCodec;
 use super::field::Field;

@@ -4,7 +4,6 @@ use super::WindowCodec;
 use super::decode::Block;
 use super::field::{Field, RUN};
 use crate::base::grid::Region;
-use crate::base::sample;
 use crate::wavelet::LANES;
 use std::ops::Range;
 use wavesplat_format::{BlockEntry, PartKind};
@@ -33,9 +32,6 @@ impl Block {
                 self.store(codec, at, values, &mut out[to * size..(to + values.len()) * size]);
             }
         });
-        if let Some((lo, hi)) = codec.clip {
-            sample::clip(codec.sample, lo, hi, &mut out);
-        }
         for (at, bytes) in self.outliers.positions.iter().zip(self.outliers.samples.chunks_exact(size)) {
             if let Some(to) = self.place(*at as usize, frames, part) {
                 out[to * size..(to + 1) * size].copy_from_slice(bytes);

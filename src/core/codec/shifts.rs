@@ -12,6 +12,7 @@
 //! common divisor with N. So a larger code never makes a sample smaller. Samples that would leave their bound are not shifted. All are then
 //! clamped, restored and moved to their sides as without sums.
 
+use super::WindowCodec;
 use crate::base::sample::{self, SampleType};
 use wavesplat_format::SumCodes;
 
@@ -70,8 +71,24 @@ impl FrameRun {
     }
 }
 
+/// Stores decoded values as a reader returns them.
+pub(super) fn store(codec: &WindowCodec, sums: Option<&SumCodes>, run: FrameRun, values: &[f64], out: &mut [u8]) {
+    sample::store(codec.sample, values, out);
+    shift_and_clip(codec, sums, run, out);
+}
+
+/// Shifts decoded samples so that sums are kept, and clamps them to the extremes of the source, if the file says so.
+pub(super) fn shift_and_clip(codec: &WindowCodec, sums: Option<&SumCodes>, run: FrameRun, samples: &mut [u8]) {
+    if let Some(sums) = sums {
+        add_shifts(codec.sample, sums, run, samples);
+    }
+    if let Some((lo, hi)) = codec.clip {
+        sample::clip(codec.sample, lo, hi, samples);
+    }
+}
+
 /// Adds to some samples what keeps the sum of their frame.
-pub(super) fn add_shifts(ty: SampleType, codes: &SumCodes, run: FrameRun, samples: &mut [u8]) {
+fn add_shifts(ty: SampleType, codes: &SumCodes, run: FrameRun, samples: &mut [u8]) {
     let (first, end) = (run.first, run.first + samples.len() / ty.size());
     let place = |voxel: usize| (run.frame * run.voxels + voxel) as u32;
     let from = codes.unshifted.partition_point(|sample| *sample < place(first));

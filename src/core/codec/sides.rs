@@ -10,7 +10,7 @@ use super::WindowCodec;
 use super::field::Field;
 use super::load::Source;
 use super::refine::Coded;
-use super::shifts::{FrameRun, add_shifts, largest_shift, spacing};
+use super::shifts::{self, FrameRun, largest_shift, spacing};
 use crate::base::sample::{self, SampleType};
 use crate::base::vectors::dispatch;
 use std::ops::Range;
@@ -340,13 +340,7 @@ impl Source<'_> {
         let (mut samples, size, voxels) = (source.to_vec(), codec.sample.size(), self.voxels());
         self.for_each_run(field, near.into_iter(), |first, values| {
             let bytes = &mut samples[first * size..][..values.len() * size];
-            sample::store(codec.sample, values, bytes);
-            if let Some(sums) = sums {
-                add_shifts(codec.sample, sums, FrameRun::of(first, voxels), bytes);
-            }
-            if let Some((lo, hi)) = codec.clip {
-                sample::clip(codec.sample, lo, hi, bytes);
-            }
+            shifts::store(codec, sums, FrameRun::of(first, voxels), values, bytes);
         });
         let missing = if self.missing.count > 0 { self.missing.mask() } else { &[] };
         let are_missing = missing.iter().enumerate().filter(|(_, is_missing)| **is_missing).map(|(index, _)| index);

@@ -59,15 +59,15 @@ pub struct Estimate {
     pub blocks: usize,
     /// Windows with coded blocks.
     pub windows: usize,
-    /// How far results are off that are computed from the samples of the coded blocks; `None` of colours.
-    pub results: Option<ResultsOff>,
+    /// Errors of what is computed from the samples of the coded blocks; `None` of colours.
+    pub results: Option<EstimatedErrors>,
     /// Bytes of the coefficient file with what is to be kept; `None` if nothing is.
     pub kept_bytes: Option<u64>,
 }
 
-/// How far results are off that are computed from samples which keep only their bound.
+/// Errors of what is computed from samples that keep only their bound.
 #[derive(Debug, Clone, Serialize)]
-pub struct ResultsOff {
+pub struct EstimatedErrors {
     /// The root mean square of the errors of differences between frames, as a share of that of the differences; `None` if these are 0.
     pub difference: Option<f64>,
     /// The same of gradients by central differences.
@@ -83,7 +83,7 @@ pub struct ResultsOff {
     pub sides: Vec<Option<f64>>,
 }
 
-impl ResultsOff {
+impl EstimatedErrors {
     fn new(of: &DerivedErrors) -> Self {
         let [difference, gradient, laplacian] = [of.difference, of.gradient, of.laplacian].map(ResultErrors::share);
         let sides = of.crossings.iter().map(|crossings| crossings.share()).collect();
@@ -143,7 +143,7 @@ pub fn estimates(
             BlocksCoded { is_rough, computed: Some(computed), ..BlocksCoded::new(&plain, &plan, &blocks, found) };
         let bytes = coded.bytes(source, &windows, frames, &mut scheme, progress)?;
         let results = coded.derived.into_inner().unwrap_or_default();
-        let results = input.colour_transform.is_none().then(|| ResultsOff::new(&results));
+        let results = input.colour_transform.is_none().then(|| EstimatedErrors::new(&results));
         let kept_bytes = match config.keep.is_empty() {
             true => None,
             false => {
@@ -256,7 +256,7 @@ struct BlocksCoded<'a> {
     encoders: Encoders,
     /// Results whose errors are measured.
     computed: Option<Computed>,
-    /// How far results are off so far, if that is measured.
+    /// The errors measured so far.
     derived: Mutex<DerivedErrors>,
 }
 

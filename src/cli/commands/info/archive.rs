@@ -167,7 +167,7 @@ impl<'a> Info<'a> {
         text + &self.results(&self.estimates)
     }
 
-    /// How far results are off at some tolerances, a line for each, and what the promises cost.
+    /// The errors of what is computed at some tolerances, a line for each, and what the promises cost.
     fn results(&self, estimates: &[Estimate]) -> String {
         let unit = self.units.map_or(String::new(), |unit| format!(", in {unit}"));
         let sides = self.keep.sides.iter().map(|value| format!("side {value}"));
