@@ -173,7 +173,7 @@ fn to_bytes(ty: SampleType, values: &[f64], out: &mut [u8]) {
 
 /// Replaces samples below `lo` by it, and those above `hi` by that.
 pub fn clip(ty: SampleType, lo: f64, hi: f64, samples: &mut [u8]) {
-    let mut values = vec![0.0; CLIPPED];
+    let mut values = vec![0.0; CLIPPED.min(samples.len() / ty.size())];
     for run in samples.chunks_mut(CLIPPED * ty.size()) {
         let values = &mut values[..run.len() / ty.size()];
         load(ty, run, values);
