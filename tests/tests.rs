@@ -7,6 +7,7 @@ mod adversary; // series made to break a bound by someone who knows the encoder
 mod bounds; // random series of every kind and type against the error bounds
 mod catalogue; // what is guaranteed for each kind of difficult number
 mod certificates; // no pixel is further from the truth than its certificate says
+mod composite_certificates; // nor is any of a composite from that of an original
 mod channels; // files of colours keep the bound in every channel
 mod citations; // every citation leads to a work, a file or an equation
 mod cli; // the programs from outside: arguments, files, pipes, messages, exit codes

@@ -1,7 +1,7 @@
 //! The programs' pictures of composites and largest values.
 
 use super::render::decode_png;
-use super::{Work, floats, read_npy};
+use super::{Work, floats, read_npy, small};
 
 /// The header of an array of `f32`, and its numbers.
 fn singles(work: &Work, name: &str) -> (String, Vec<f32>) {
@@ -112,7 +112,8 @@ fn options_without_meaning_for_a_mode_are_refused() {
         ("a.wspl --mode composite --norm log", &["--norm"]),
         ("a.wspl --mode composite --tau 1", &["--tau"]),
         ("a.wspl --mode composite --quantity emission", &["--quantity"]),
-        ("a.wspl --mode composite --error-image e.npy", &["--error-image"]),
+        ("a.wspl --mode mip --error-image e.npy", &["--error-image", "composites"]),
+        ("a.wspl --iso 1 --error-image e.npy", &["--error-image", "composites"]),
         ("a.wspl --mode composite --slices 0", &["--slices", "1 to"]),
         ("a.wspl --mode composite --opacity-unit 0", &["--opacity-unit", "above 0"]),
         ("a.wspl --mode composite --opacity 0:0", &["--opacity", "two or more"]),
@@ -137,6 +138,28 @@ fn options_without_meaning_for_a_mode_are_refused() {
     }
     work.render(&format!("a.wspl --mode composite {SIZE} -o - --format gray16")).fails(2, &["gray16"]);
     assert_eq!(work.names(), ["a.npy", "a.wspl", "c.wspl"]);
+}
+
+#[test]
+fn an_error_image_bounds_the_light_of_every_pixel() {
+    let work = Work::with_file("--tolerance 0.004");
+    small().write_frames(&work, "frames");
+    let options = format!("--mode composite --opacity 0:0,1:0.2 --range 0,1 {SIZE} --frames 0,9 --force --json");
+    let numbers = |name: &str| floats(&read_npy(&work.read(name)).1);
+    let drawn = |input: &str, name: &str| {
+        let run = work.render(&format!("{input} {options} -o {name}.npy --error-image {name}-e.npy")).ok();
+        (numbers(&format!("{name}.npy")), numbers(&format!("{name}-e.npy")), run.json()["certified_error"].as_f64())
+    };
+    let ((file, errors, certified), (truth, rounding, _)) =
+        (drawn("a.wspl", "a"), drawn("frames --method direct", "b"));
+    assert!(errors.len() == 2 * 48 * 40 && file.len() == 4 * errors.len());
+    assert!(errors.iter().all(|error| f64::from(*error) <= certified.unwrap()) && certified.unwrap() < 0.3);
+    for (pixel, (file, truth)) in file.chunks_exact(4).zip(truth.chunks_exact(4)).enumerate() {
+        let off = file.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off <= errors[pixel] + rounding[pixel], "{pixel}: {off}");
+    }
+    work.render(&format!("a.wspl {options} -o c_%d.png --error-image e_%d.png")).ok();
+    assert!(work.names().contains(&"e_9.png".to_string()));
 }
 
 /// A volume that is 0 but for a bright box.

@@ -118,6 +118,15 @@ impl Mode {
         }
     }
 
+    /// Whether the errors of pixels can be bounded.
+    fn can_be_certified(&self) -> bool {
+        match self {
+            Self::Projection => true,
+            Self::Composite { planes, .. } => planes.is_empty(),
+            Self::Iso { .. } | Self::Mip { .. } | Self::Planes { .. } => false,
+        }
+    }
+
     /// An error if the mode's own settings cannot be used.
     fn check(&self) -> Result<()> {
         match self {
@@ -242,6 +251,11 @@ impl RenderConfig {
         Ok(clip)
     }
 
+    /// Whether errors are splatted beside values.
+    pub(super) fn splats_errors(&self) -> bool {
+        self.certify && self.mode.is_projection()
+    }
+
     /// Whether the selection of blocks depends on the view.
     pub(super) fn chooses_by_view(&self) -> bool {
         self.allowed.is_some() && self.error == Limit::Expected
@@ -275,11 +289,14 @@ impl RenderConfig {
         }
         let refused = [
             (self.kernel.tau != 0.0, "tau"),
-            (self.certify, "certify"),
             (self.fast, "fast"),
             (self.chooses_by_view(), "error"),
             (self.quantity != Quantity::Mean, "quantity"),
         ];
+        if self.certify && !self.mode.can_be_certified() {
+            let what = "applies to projections, and to composites without planes";
+            return Err(Error::setting("certify", Note::with(what, Remedy::Project)));
+        }
         let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));
         refused.iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, setting)| Err(projects(setting)))
     }

@@ -60,8 +60,8 @@ mod pictures;
 pub mod partial;
 
 pub use batches::{
-    BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout, Order,
-    OverviewRequest, PlaneValues, SampleErrors, Scene, Scratch, Selection, Thinning, stride,
+    BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, BlockRange, Expectation, FrameBatch, FrameBounds, Inverse,
+    Layout, Order, OverviewRequest, PlaneValues, SampleErrors, Scene, Scratch, Selection, Thinning, stride,
 };
 pub use config::{Limit, Mode, Pixel, Plane, Quantity, RenderConfig, default_splat_error, splat_method};
 pub use light::{Light, Surface};
@@ -92,7 +92,8 @@ fn renderer<'a>(scene: &dyn Scene, config: &'a RenderConfig) -> Result<Box<dyn R
         Mode::Composite { transfer, unit, light, planes, .. } => {
             let unit = unit.unwrap_or(spacing);
             let blend = move |view: &_| Composite::new(transfer, unit, *light, view, spacing);
-            Box::new(Sliced::new(grid, config, blend)?.with_planes(planes, transfer))
+            let sliced = Sliced::new(grid, config, blend)?;
+            Box::new(if config.certify { sliced.certified() } else { sliced.with_planes(planes, transfer) })
         }
         Mode::Iso { surfaces, light, .. } => {
             Box::new(Sliced::new(grid, config, |view| Isosurfaces::new(surfaces, *light, view))?)

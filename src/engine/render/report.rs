@@ -19,8 +19,9 @@ pub struct Rendered<'a> {
     pub frame: usize,
     /// The picture in the requested quantity.
     pub picture: Picture<'a>,
-    /// The error bound of every pixel, in the same unit, if pictures are certified. The reference is the picture of the
-    /// source's samples, splatted without a cut and without rounding. NaN is background.
+    /// The error bound of every pixel, in the same unit, if pictures are certified. For projections, the reference is the picture of the
+    /// source's samples, splatted without a cut and without rounding, and NaN is background. For composites it is one number a pixel, which
+    /// bounds light and opacity; the reference is the same drawing of the source's samples, without rounding and with no ray ended early.
     pub error: Option<Picture<'a>>,
 }
 
@@ -32,7 +33,7 @@ pub struct RenderReport {
     /// How each view was splatted.
     pub views: Vec<ViewReport>,
     /// Blocks in the scene, over all windows and channels touched. This and the following counts of blocks and tiles
-    /// include a block or tile again for each frame batch and each group of views.
+    /// include a block or tile again for each frame batch, each group of views and each sweep of a certified composite.
     pub blocks: u64,
     /// Blocks that were decoded; repeated decoding counts again.
     pub blocks_read: u64,
@@ -142,6 +143,12 @@ pub struct ViewReport {
 }
 
 impl RenderReport {
+    /// Counts the error bounds of some pixels. NaN is background.
+    pub(super) fn count_certified<'a>(&mut self, errors: impl IntoIterator<Item = &'a f32>) {
+        let largest = errors.into_iter().map(|e| f64::from(*e)).fold(self.certified_error.unwrap_or(0.0), f64::max);
+        self.certified_error = Some(largest);
+    }
+
     /// Turns the sums over the frames of each view into root mean squares, and combines these into one for all views.
     pub(super) fn sum_up_expected_errors(&mut self, frames: usize) {
         let (frames, views) = (frames.max(1) as f64, self.views.len() as f64);

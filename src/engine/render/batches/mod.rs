@@ -31,6 +31,7 @@ pub use plane_values::{BlockPlanes, PlaneValues, Scratch};
 pub(super) use read::{BlockAdder, BlockReader, BlockSource, ReadStats};
 pub(super) use sampled::SampledView;
 pub(super) use samples::{BlockSamples, SampleReader};
-pub use scene::{BatchOutcome, BatchRequest, BlockBytes, FrameBatch, FrameBounds};
+pub(super) use scene::INVERSE;
+pub use scene::{BatchOutcome, BatchRequest, BlockBytes, BlockRange, FrameBatch, FrameBounds};
 pub use scene::{Inverse, SampleErrors, Scene, Selection};
 pub(super) use units::Units;

@@ -196,14 +196,24 @@ pub enum BatchOutcome {
     NeedsRelayout,
 }
 
+/// What is known of a block before it is read.
+#[derive(Debug, Clone, Copy)]
+pub struct BlockRange {
+    /// Index of the block.
+    pub block: usize,
+    /// A range that holds its samples as splatted; inverted if all are missing.
+    pub range: (f64, f64),
+    /// Error bound of its samples against the source. If the range is unknown, that of the frames counts as well.
+    pub error: f64,
+}
+
 /// The blocks of a batch, selected once when it is opened.
 #[derive(Debug, Default)]
 pub struct Selection {
     /// Blocks that touch the region and add to a plane, ascending.
     pub blocks: Vec<usize>,
-    /// For modes with slices: every block that touches the region, with a range that holds its samples as splatted. The
-    /// range is inverted if all samples are missing. Empty for projections.
-    pub ranges: Vec<(usize, (f64, f64))>,
+    /// For modes with slices: what is known of every block that touches the region. Empty for projections.
+    pub ranges: Vec<BlockRange>,
     /// Number of blocks that hold nothing in the region.
     pub empty: u64,
     /// The parts that a looser tolerance leaves out.
@@ -221,10 +231,10 @@ impl Selection {
     pub fn of_all(blocks: BlockGrid, request: &BatchRequest<'_>) -> Self {
         let region = request.config.region.unwrap_or(Region { start: [0; 3], end: blocks.dims });
         let touching: Vec<usize> = blocks.touching(&region).collect();
-        let any = (f64::NEG_INFINITY, f64::INFINITY);
+        let range = (f64::NEG_INFINITY, f64::INFINITY);
         let ranged = if request.config.mode.is_projection() { &[][..] } else { &touching };
         Self {
-            ranges: ranged.iter().map(|block| (*block, any)).collect(),
+            ranges: ranged.iter().map(|block| BlockRange { block: *block, range, error: 0.0 }).collect(),
             empty: (blocks.len() - touching.len()) as u64,
             blocks: touching,
             expected: vec![0.0; request.views.len()],
@@ -251,4 +261,15 @@ pub struct FrameBounds {
     pub range: (f64, f64),
     /// The largest sum of absolute terms of any sample.
     pub absolute_sum: f64,
+}
+
+/// The rounding of the inverse transform, as a share of the sum of absolute terms. It has at most ten levels of up to
+/// seven products each, and its intermediate sums are at most a few hundred times larger than the terms.
+pub(in crate::render) const INVERSE: f64 = 1.0 / (1u64 << 36) as f64;
+
+impl FrameBounds {
+    /// The rounding of any sample.
+    pub(in crate::render) fn rounding(&self) -> f64 {
+        INVERSE * self.absolute_sum
+    }
 }

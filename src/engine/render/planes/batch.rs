@@ -1,7 +1,7 @@
 //! Renders the planes of a batch of frames, from the blocks that they cut.
 
 use super::PlanesView;
-use crate::render::batches::{BlockSamples, SampleReader, Units};
+use crate::render::batches::{BlockRange, BlockSamples, SampleReader, Units};
 use crate::render::report::RenderReport;
 use wavesplat_core::base::error::Result;
 
@@ -38,9 +38,10 @@ impl PlanesPass<'_> {
         let SampleReader { batch, blocks, .. } = self.reader;
         let ranges = batch.selection().ranges.iter();
         let listed = &batch.selection().blocks;
-        let is_missing = |block: &usize, (lo, hi): &(f64, f64)| lo > hi && listed.binary_search(block).is_err();
-        for (block, _) in ranges.filter(|(block, range)| is_missing(block, range)) {
-            self.view.add(&blocks.region(*block), frames, |_, _| f64::NAN, sums);
+        let is_missing =
+            |known: &&BlockRange| known.range.0 > known.range.1 && listed.binary_search(&known.block).is_err();
+        for known in ranges.filter(is_missing) {
+            self.view.add(&blocks.region(known.block), frames, |_, _| f64::NAN, sums);
         }
     }
 

@@ -19,15 +19,11 @@
 //! the rounding of its weights times itself.
 
 use super::weight_sums::PixelWeight;
-use crate::render::batches::FrameBounds;
+use crate::render::batches::{FrameBounds, INVERSE};
 use crate::render::config::Quantity;
 use crate::render::splat::ViewSetup;
 use wavesplat_core::base::sample::magnitude;
 use wavesplat_core::view::footprint::Method;
-
-/// The rounding of the inverse transform, as a share of the sum of absolute terms. It has at most ten levels of up to
-/// seven products each, and its intermediate sums are at most a few hundred times larger than the terms.
-const INVERSE: f64 = 1.0 / (1u64 << 36) as f64;
 
 /// Computes the error bounds of a view's pixels.
 #[derive(Debug, Clone, Copy)]

@@ -134,9 +134,7 @@ fn render_batch(
         |view: usize, tile: ResolvedTile<'_>, rows: &mut Pixels<'_, f32>| reconstructors[view].tile(tile, rows);
     group.splat(batch, budget, report, &mut pictures, &finish)?;
     if config.certify {
-        let errors = pictures.iter().flat_map(|all| &all[layout.frames * pixels..]);
-        let largest = errors.map(|e| f64::from(*e)).fold(report.certified_error.unwrap_or(0.0), f64::max);
-        report.certified_error = Some(largest);
+        report.count_certified(pictures.iter().flat_map(|all| &all[layout.frames * pixels..]));
     }
     Ok(pictures.into_iter().map(|all| Pictures { pixels, all }).collect())
 }

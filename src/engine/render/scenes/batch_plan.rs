@@ -56,7 +56,8 @@ impl BatchPlan {
         let wanted = WantedFrames::new(&codec, frames);
         let kept: Vec<usize> = (0..wanted.coefficients.len()).filter(|k| wanted.coefficients[*k]).collect();
         let few = few_asked(file, &codec, window, config);
-        let by_values = what != SplatSource::Samples && !config.certify && (few || !config.mode.is_projection());
+        let by_values =
+            what != SplatSource::Samples && !config.splats_errors() && (few || !config.mode.is_projection());
         let values = what == SplatSource::Samples || by_values;
         let layout = layout(file, &codec, window, request, values, kept.len());
         Ok(Self { what, codec, wanted, kept, by_values, few, layout })
@@ -71,7 +72,7 @@ impl BatchPlan {
 /// Number of error planes: one for the error that holds in every frame, and one for each level part that may be left
 /// out.
 pub(super) fn error_planes(config: &RenderConfig, levels: usize) -> usize {
-    match (config.certify, config.allowed) {
+    match (config.splats_errors(), config.allowed) {
         (false, _) => 0,
         (true, None) => 1,
         (true, Some(_)) => 1 + levels,

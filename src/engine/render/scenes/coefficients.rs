@@ -10,8 +10,8 @@ use super::select::{BlockSelector, BlockView, KeptParts, RateAllocator, Rule};
 use crate::file::promise::share_tolerance;
 use crate::file::{BlockValues, CoefficientFile, DecodedBlock, Prefetch};
 use crate::render::batches::{
-    BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, Expectation, FrameBatch, FrameBounds, Inverse, Layout,
-    OverviewRequest, SampleErrors, Scene, Selection,
+    BatchOutcome, BatchRequest, BlockBytes, BlockPlanes, BlockRange, Expectation, FrameBatch, FrameBounds, Inverse,
+    Layout, OverviewRequest, SampleErrors, Scene, Selection,
 };
 use crate::render::config::{Limit, RenderConfig};
 use crate::render::report::LeftOut;
@@ -205,7 +205,8 @@ impl<'a> CoefficientBatch<'a> {
                 let kept = self.keep(&entry);
                 absolute_sum = absolute_sum.max(self.selector.absolute_sum(&entry));
                 if with_ranges {
-                    found.ranges.push((entry.id.block as usize, self.range(&entry, &kept)));
+                    let (block, range) = (entry.id.block as usize, self.range(&entry, &kept));
+                    found.ranges.push(BlockRange { block, range, error: kept.certified });
                 }
                 self.expect(&entry, &kept, &mut found.expected);
                 self.add(&entry, &kept, &mut found);
@@ -244,7 +245,7 @@ impl<'a> CoefficientBatch<'a> {
         let BlockStats { min, max, reached, .. } = entry.stats;
         // Without all parts, samples differ from the source by `certified`, and the source differs from the stored
         // range by `reached`.
-        let is_whole = kept.left_out.parts == 0 && kept.left_out.blocks == 0;
+        let is_whole = kept.left_out.parts == 0 && kept.left_out.blocks == 0 && kept.certified == reached;
         let off = if !is_whole { kept.certified + reached } else { 0.0 };
         let off = off + rounding(self.plan.codec.sample, magnitude((min, max)));
         (min - off, max + off)

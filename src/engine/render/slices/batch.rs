@@ -37,14 +37,13 @@ struct Frame<B: Blend> {
 }
 
 impl<B: Blend> Frame<B> {
-    fn new(view: &SlicedView, most: usize, units: Units) -> Self {
-        let groups = groups(view);
+    fn new(view: &SlicedView, most: usize, units: Units, groups: Vec<B::Group>) -> Self {
         Self {
             units,
             layers: Layers::new(view, most),
-            groups: vec![B::EMPTY; groups],
-            limits: vec![B::OPEN; groups],
-            last: vec![LastMeans::NONE; if view.has_parts() { groups } else { 0 }],
+            limits: vec![B::OPEN; groups.len()],
+            last: vec![LastMeans::NONE; if view.has_parts() { groups.len() } else { 0 }],
+            groups,
         }
     }
 }
@@ -88,12 +87,24 @@ fn rows_of_band(view: &SlicedView) -> usize {
 impl<B: Blend> SlicePass<'_, B> {
     /// Sweeps the slices of all frames.
     pub(in crate::render) fn sweep(&self, report: &mut RenderReport) -> Result<Swept<B>> {
+        let is_probed = report.views[self.number].probed.is_none() && self.stops.is_none();
+        let probe = is_probed.then(|| Probe::new(self.view, self.blend));
+        let empty = |_| vec![B::EMPTY; groups(self.view)];
+        self.sweep_from((0..self.reader.batch.layout().frames).map(empty).collect(), probe, report)
+    }
+
+    /// The same from the given groups of each frame on.
+    pub(super) fn sweep_from(
+        &self,
+        groups: Vec<Vec<B::Group>>,
+        mut probe: Option<Probe<B>>,
+        report: &mut RenderReport,
+    ) -> Result<Swept<B>> {
         let SampleReader { batch, blocks, progress, .. } = *self.reader;
         let known = Known::new(self.view, blocks, batch.selection());
         let (units, most) = (self.units(&known)?, most_layers(self.view, blocks));
-        let mut frames: Vec<Frame<B>> = units.par_iter().map(|units| Frame::new(self.view, most, *units)).collect();
-        let mut probe = (report.views[self.number].probed.is_none() && self.stops.is_none())
-            .then(|| Probe::new(self.view, self.blend));
+        let of_frame = |(units, groups): (&Units, _)| Frame::new(self.view, most, *units, groups);
+        let mut frames: Vec<Frame<B>> = units.par_iter().zip(groups).map(of_frame).collect();
         let mut next = 0;
         for layer in self.layers() {
             let met = layer.iter().map(|at| self.view.met_at(*at) + 1).max().unwrap_or(0);
@@ -236,6 +247,11 @@ struct SweptFrame<B: Blend> {
 }
 
 impl<B: Blend> Swept<B> {
+    /// The groups of each frame.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &[B::Group]> {
+        self.frames.iter().map(|frame| frame.groups.as_slice())
+    }
+
     /// Gives the pictures of view `number` one after another, with their places in the batch.
     pub(in crate::render) fn pictures(
         self,

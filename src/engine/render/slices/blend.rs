@@ -13,11 +13,13 @@ use wavesplat_core::colour::TransferFunction;
 
 /// Emission and absorption: the light of each slice passes through the slices before it.
 pub(in crate::render) struct Composite {
-    table: Table,
+    pub(super) table: Table,
     /// The light of slabs of several slices.
     slabs: Option<SlabTable>,
     /// The light on the colours, if they are shaded.
-    shader: Option<Shader>,
+    pub(super) shader: Option<Shader>,
+    /// Whether the light of every ray follows from its own length (eq 30); else nearly whole rays count as whole.
+    by_lengths: bool,
 }
 
 impl Composite {
@@ -32,12 +34,17 @@ impl Composite {
         let table = Table::new(transfer, view.step / unit);
         let slabs = view.has_parts().then(|| SlabTable::new(&table, view.parts()));
         let shader = light.map(|light| Shader::new(light, view, table.faint(spacing)));
-        Self { table, slabs, shader }
+        Self { table, slabs, shader, by_lengths: false }
+    }
+
+    /// The same with the light of every ray from its own length, and so from one formula.
+    pub(in crate::render) fn by_lengths(self) -> Self {
+        Self { by_lengths: true, ..self }
     }
 }
 
 /// Sixteen cells as four vectors of four: red, green and blue of the light, and the transmittance.
-type Cells = [[f32; GROUP]; 4];
+pub(super) type Cells = [[f32; GROUP]; 4];
 
 impl Blend for Composite {
     type Group = Cells;
@@ -71,7 +78,8 @@ impl Blend for Composite {
         let slab = self.slabs.as_ref().filter(|_| row.thickness > 1);
         let table = slab.map_or(&self.table, |slab| &slab.table);
         let (steady, shader) = (slab.map(|slab| &*slab.steady), self.shader.as_ref());
-        let slices = Slices { entries: &table.entries, colours: &table.colours, steady, shader };
+        let slices =
+            Slices { entries: &table.entries, colours: &table.colours, steady, shader, by_lengths: self.by_lengths };
         dispatch!(add(row, &slices, groups));
     }
 
@@ -128,11 +136,13 @@ pub(super) fn off_light(exact: &[f64; 4], pixel: &[f32]) -> f64 {
 
 /// How the means of a slice, or of a slab, become light.
 struct Slices<'a> {
+    /// The light of whole rays.
     entries: &'a Entries,
     colours: &'a Entries,
     /// For a slab, the largest change of the means at each entry for which it counts as one slice.
     steady: Option<&'a [f32; ENTRIES]>,
     shader: Option<&'a Shader>,
+    by_lengths: bool,
 }
 
 #[inline(always)]
@@ -142,7 +152,7 @@ fn add(row: &Row<'_>, slices: &Slices<'_>, groups: RowGroups<'_, Cells>) {
         if !*live {
             continue;
         }
-        let (means, lengths) = if row.is_whole(n) {
+        let (means, lengths) = if row.is_whole(n) && !slices.by_lengths {
             (row.sums(n), None)
         } else {
             let (means, lengths) = row.means(n);
@@ -197,7 +207,7 @@ fn is_steady(means: &Sixteen, last: &mut LastMeans, row: &Row<'_>, steady: &[f32
 
 /// The numbers of the values of cells 4q to 4q + 3.
 #[inline(always)]
-fn four_entries(q: usize, places: &[u32; GROUP], rests: &Sixteen, entries: &Entries) -> [f32; GROUP] {
+pub(super) fn four_entries(q: usize, places: &[u32; GROUP], rests: &Sixteen, entries: &Entries) -> [f32; GROUP] {
     let [mut numbers, mut changes, mut shares] = [[0.0; GROUP]; 3];
     for i in 0..4 {
         let entry = &entries[places[4 * q + i] as usize % ENTRIES];
@@ -237,7 +247,7 @@ fn fourths(cells: &[f32; GROUP]) -> [f32; 4] {
 
 /// For each number, the entry before it, and how far it is towards the next, from 0 to 1.
 #[inline(always)]
-fn places(numbers: &Sixteen) -> ([u32; GROUP], Sixteen) {
+pub(super) fn places(numbers: &Sixteen) -> ([u32; GROUP], Sixteen) {
     /// Adding this rounds a number to a whole one, which the last bits then hold.
     const WHOLE: f32 = 12_582_912.0;
     let (mut entries, mut rests) = ([0; GROUP], [0.0; GROUP]);
@@ -267,7 +277,7 @@ fn add_whole(means: &Sixteen, entries: &Entries, group: &mut Cells) -> f32 {
 
 /// Whether none of these values has an opacity.
 #[inline(always)]
-fn is_clear(means: &Sixteen, colours: &Entries) -> bool {
+pub(super) fn is_clear(means: &Sixteen, colours: &Entries) -> bool {
     let (places, _) = places(means);
     let mut sum = 0.0;
     for place in places {
@@ -283,7 +293,13 @@ const COLOURS: Sixteen = [1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0,
 /// Adds a slice whose rays have these lengths behind a group of cells (eq 30), with light on the colours if there is any (eq
 /// 42). Returns their limit.
 #[inline(always)]
-fn add_part(means: &Sixteen, lengths: &Sixteen, colours: &Entries, lit: Option<&Lit>, group: &mut Cells) -> f32 {
+pub(super) fn add_part(
+    means: &Sixteen,
+    lengths: &Sixteen,
+    colours: &Entries,
+    lit: Option<&Lit>,
+    group: &mut Cells,
+) -> f32 {
     let (places, rests) = places(means);
     let mut sum = [0.0; GROUP];
     for (q, cells) in group.iter_mut().enumerate() {
@@ -316,7 +332,7 @@ fn limit(group: &Cells, sum: &[f32; GROUP]) -> f32 {
 
 /// The opacity where light falls by a power of two: 1 - 2^-power for a power of at least 0, to 2e-7.
 #[inline(always)]
-fn opacity(power: f32) -> f32 {
+pub(super) fn opacity(power: f32) -> f32 {
     const WHOLE: f32 = 12_582_912.0;
     let power = -power.min(100.0);
     let rounded = power + WHOLE;

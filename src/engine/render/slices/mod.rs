@@ -38,6 +38,8 @@
 //! With sharp opacities, slabs of at most a voxel have several slices. Where the values of a group of cells hardly change
 //! from slab to slab, one slice of the slab's thickness takes their place.
 //!
+//! A certified composite is swept twice: first it is drawn, then the errors of its pixels are bounded ([`certificate`], eq 49).
+//!
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.
 
@@ -54,11 +56,14 @@ mod blend;
 mod cover;
 mod iso;
 mod mip;
+mod steepest;
 mod sweep;
 mod finish;
 mod probe;
 mod needed;
 mod batch;
+mod field_errors;
+mod certificate;
 mod renderer;
 
 #[cfg(test)]

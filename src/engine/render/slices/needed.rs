@@ -34,12 +34,10 @@ const INVERTED: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 impl<'a> Known<'a> {
     pub(super) fn new(view: &'a SlicedView, blocks: BlockGrid, selection: &Selection) -> Self {
         let (mut ranges, mut has_values) = (vec![INVERTED; blocks.len()], vec![false; blocks.len()]);
-        selection.ranges.iter().for_each(|(block, range)| ranges[*block] = *range);
+        selection.ranges.iter().for_each(|known| ranges[known.block] = known.range);
         selection.blocks.iter().for_each(|block| has_values[*block] = true);
-        let mut wide = ranges.clone();
-        for (i, axis) in view.shear.axes.into_iter().enumerate() {
-            widen(&mut wide, blocks, axis, (2 * (view.reach[i] + view.margin[i]) - 1).div_ceil(blocks.edges[axis]));
-        }
+        // Cells that a block reaches are also reached by others.
+        let wide = around(view, blocks, ranges.clone(), |i| 2 * (view.reach[i] + view.margin[i]) - 1);
         Self { view, blocks, ranges, wide, has_values }
     }
 
@@ -91,6 +89,19 @@ impl<'a> Known<'a> {
     fn any(&self, block: usize) -> f64 {
         self.ranges[block].0.max(f64::MIN).min(self.ranges[block].1)
     }
+}
+
+/// The ranges of every block together with those of the blocks within so many voxels along b, c and a.
+pub(super) fn around(
+    view: &SlicedView,
+    blocks: BlockGrid,
+    mut ranges: Vec<(f64, f64)>,
+    voxels: impl Fn(usize) -> usize,
+) -> Vec<(f64, f64)> {
+    for (i, axis) in view.shear.axes.into_iter().enumerate() {
+        widen(&mut ranges, blocks, axis, voxels(i).div_ceil(blocks.edges[axis]));
+    }
+    ranges
 }
 
 /// Joins the ranges of every block with those of the `reach` blocks before and behind it along an axis.

@@ -1,6 +1,8 @@
 //! Composites, isosurfaces and maximum intensity projections: every frame batch slice by slice, one view after another.
 
 use super::batch::{SlicePass, Swept, bytes};
+use super::blend::Composite;
+use super::certificate::{certificate_bytes, pixel_errors};
 use super::row::Blend;
 use super::stops::Stops;
 use super::view::SlicedView;
@@ -15,11 +17,33 @@ use wavesplat_core::base::grid::{BlockGrid, Grid};
 use wavesplat_core::colour::TransferFunction;
 
 /// Renders views slice by slice, combined by `B`. Progress counts slices of frames.
-pub(in crate::render) struct Sliced<'a, B> {
+pub(in crate::render) struct Sliced<'a, B: Blend> {
     views: Vec<SlicedView>,
     /// How the slices of a view combine.
     blend: Box<dyn Fn(&SlicedView) -> B + 'a>,
     planes: Option<ColouredPlanes<'a>>,
+    certifier: Option<Certifier<B>>,
+}
+
+/// Bounds of the errors of pixels, frame by frame.
+type FrameErrors = Vec<Vec<f32>>;
+
+/// What bounds the errors of pixels.
+struct Certifier<B: Blend> {
+    /// The bounds of each frame of a batch after its slices.
+    errors: fn(&SlicePass<'_, B>, &Swept<B>, &mut RenderReport) -> Result<FrameErrors>,
+    /// Bytes that this takes for a number of frames, without decoded blocks. The last argument is whether light falls on the field.
+    bytes: fn(&SlicedView, usize, BlockGrid, bool) -> usize,
+}
+
+impl<'a> Sliced<'a, Composite> {
+    /// The same with bounds of the errors of all pixels. Every slice is drawn, no slab in place of several, and every ray by its length.
+    pub(in crate::render) fn certified(self) -> Self {
+        let views = self.views.iter().map(SlicedView::slice_by_slice).collect();
+        let blend = self.blend;
+        let certifier = Some(Certifier { errors: pixel_errors, bytes: certificate_bytes });
+        Self { views, blend: Box::new(move |view| blend(view).by_lengths()), certifier, planes: None }
+    }
 }
 
 /// Planes in the volume, and their colours.
@@ -33,6 +57,8 @@ struct ColouredPlanes<'a> {
 struct Drawn<B: Blend> {
     swept: Swept<B>,
     planes: Option<Vec<f32>>,
+    /// The bounds of the errors of each frame's pixels, if pictures are certified.
+    errors: Option<FrameErrors>,
 }
 
 impl<'a, B: Blend> Sliced<'a, B> {
@@ -42,7 +68,7 @@ impl<'a, B: Blend> Sliced<'a, B> {
         blend: impl Fn(&SlicedView) -> B + 'a,
     ) -> Result<Self> {
         let views = config.views.iter().map(|view| SlicedView::new(grid, config, view));
-        Ok(Self { views: views.collect::<Result<_>>()?, blend: Box::new(blend), planes: None })
+        Ok(Self { views: views.collect::<Result<_>>()?, blend: Box::new(blend), planes: None, certifier: None })
     }
 
     /// The same with opaque planes in the volume, if there are any.
@@ -53,7 +79,9 @@ impl<'a, B: Blend> Sliced<'a, B> {
     /// Bytes to render `frames` frames together, without blocks.
     fn bytes(&self, config: &RenderConfig, view: &SlicedView, blocks: BlockGrid, frames: usize) -> usize {
         let planes = if self.planes.is_some() { Behind::bytes(view, frames) } else { 0 };
-        bytes::<B>(view, frames, blocks, config.mode.is_shaded()) + planes
+        let shaded = config.mode.is_shaded();
+        let errors = self.certifier.as_ref().map_or(0, |certifier| (certifier.bytes)(view, frames, blocks, shaded));
+        bytes::<B>(view, frames, blocks, shaded) + planes + errors
     }
 
     fn render_view(
@@ -69,17 +97,26 @@ impl<'a, B: Blend> Sliced<'a, B> {
         let behind = self.planes.map(|planes| Behind::new(scene.grid(), config, number, view, planes)).transpose()?;
         let render = |reader: &SampleReader<'_>, report: &mut RenderReport| {
             let stops = behind.as_ref().map(|behind| &behind.stops);
-            let swept = SlicePass { number, view, blend: &blend, stops, reader }.sweep(report)?;
+            let pass = SlicePass { number, view, blend: &blend, stops, reader };
+            let swept = pass.sweep(report)?;
+            let errors = self.certifier.as_ref().map(|certifier| (certifier.errors)(&pass, &swept, report));
             let planes = behind.as_ref().map(|behind| PlanesPass { view: &behind.planes, reader }.pictures(report));
-            Ok(Drawn { swept, planes: planes.transpose()? })
+            Ok(Drawn { swept, planes: planes.transpose()?, errors: errors.transpose()? })
         };
-        let give = |frames: &[usize], Drawn { swept, planes }: Drawn<B>, report: &mut RenderReport| {
+        let give = |frames: &[usize], Drawn { swept, planes, errors }: Drawn<B>, report: &mut RenderReport| {
+            errors.iter().for_each(|errors| report.count_certified(errors.iter().flatten()));
             swept.pictures(view, number, report, |n, picture| {
                 if let (Some(behind), Some(planes)) = (&behind, &planes) {
                     let each = planes.len() / frames.len();
                     behind.put(picture, &planes[n * each..][..each]);
                 }
-                sink(Rendered { views: &[], view: number, frame: frames[n], picture, error: None })
+                sink(Rendered {
+                    views: &[],
+                    view: number,
+                    frame: frames[n],
+                    picture,
+                    error: errors.as_ref().map(|errors| errors[n].as_slice()),
+                })
             })
         };
         let sampled = SampledView { config, frame_bytes: &|frames| self.bytes(config, view, blocks, frames) };
@@ -111,7 +148,8 @@ impl<B: Blend> Renderer for Sliced<'_, B> {
     }
 
     fn steps(&self) -> usize {
-        self.views.iter().map(SlicedView::slices).sum()
+        let sweeps = if self.certifier.is_some() { 2 } else { 1 };
+        self.views.iter().map(|view| sweeps * view.slices()).sum()
     }
 
     fn render(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut Output<'_, '_>) -> Result<()> {

@@ -63,7 +63,38 @@ impl Shader {
         lit
     }
 
-    /// The same for one gradient.
+    /// How far the share of the colour and the gloss of a cell may be off, if its gradient per voxel may be off by a vector of the length
+    /// `off` per world unit.
+    ///
+    /// The directions of two vectors x and y differ by at most 2 |x - y| / (|x| + |y|) ([Dunkl](wavesplat_core::bibliography)).
+    #[inline(always)]
+    pub(super) fn doubt(&self, gradient: [f32; 3], off: f32) -> [f32; 2] {
+        let Light { ambient, diffuse, specular, .. } = self.light;
+        let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
+        let slope = [gradient[0] * self.per[0], gradient[1] * self.per[1], gradient[2] * self.per[2]];
+        let (length, facing) = (dot(slope, slope).sqrt(), dot(slope, self.to_viewer));
+        let turned = if facing < 0.0 { -1.0 } else { 1.0 } / length.max(f32::MIN_POSITIVE);
+        // Where it may be turned to the other side, nothing is known of the direction.
+        let turns = if facing.abs() > off { 2.0 * off / (2.0 * length - off) } else { 1.0 };
+        let [lamp, middle] = [self.to_lamp, self.to_middle].map(|to| (dot(slope, to) * turned).clamp(0.0, 1.0));
+        let (lamp_off, [least, largest]) = (turns.min(lamp.max(1.0 - lamp)), [middle - turns, middle + turns]);
+        let [least, gloss, largest] = [least.max(0.0), middle, largest.min(1.0)].map(thirty_second);
+        let share = |length: f32| 1.0 - self.faint / (length * length + self.faint).max(f32::MIN_POSITIVE);
+        let counts = share(length);
+        let counts_off = (share(length + off) - counts).max(counts - share((length - off).max(0.0)));
+        let most = counts + counts_off;
+        let colour = most * diffuse * lamp_off + counts_off * (ambient + diffuse * lamp - 1.0).abs();
+        let of_gloss = most * specular * (largest - gloss).max(gloss - least) + counts_off * specular * gloss;
+        [colour, of_gloss].map(|off| off + OF_LIGHT * self.brightest())
+    }
+
+    /// The most light that a colour gives.
+    pub(super) fn brightest(&self) -> f32 {
+        let Light { ambient, diffuse, specular, .. } = self.light;
+        ((ambient + diffuse).max(1.0) + specular) as f32
+    }
+
+    /// [`Self::shade`] for one gradient.
     pub(super) fn shade_one(&self, gradient: [f64; 3]) -> [f64; 2] {
         // A direction of the middle size of numbers: squares of others may not be numbers.
         let most = gradient.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
@@ -86,6 +117,9 @@ impl Shader {
     }
 }
 
+/// The rounding of the light on a cell.
+const OF_LIGHT: f32 = 2e-5;
+
 #[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -97,4 +131,39 @@ fn thirty_second(number: f32) -> f32 {
     let fourth = (number * number) * (number * number);
     let sixteenth = (fourth * fourth) * (fourth * fourth);
     sixteenth * sixteenth
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_gradient_within_a_doubt_has_other_light() {
+        let unit = |v: [f32; 3]| v.map(|n| n / dot(v, v).sqrt());
+        let mut seed = 7_u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        for faint in [0.0, 0.3, 4.0] {
+            let (per, to_viewer) = ([1.0, 0.5, 2.0], unit([0.3, -0.2, 0.8]));
+            let [to_lamp, to_middle] = [unit([0.6, 0.5, 0.4]), unit([0.4, 0.1, 0.7])];
+            let shader = Shader { light: Light::default(), per, to_lamp, to_middle, to_viewer, faint };
+            let mut used = [0.0_f32; 2];
+            for n in 0..60_000 {
+                let (gradient, off) = (std::array::from_fn(|_| random()), random().abs().powi(3));
+                let turned = unit(std::array::from_fn(|_| random()));
+                let length = if n % 2 == 0 { off } else { off * random().abs() };
+                let moved = std::array::from_fn(|i| gradient[i] + turned[i] * length / per[i]);
+                let [from, to] = [gradient, moved].map(|gradient| shader.shade_cell(gradient));
+                let doubt = shader.doubt(gradient, off);
+                for i in 0..2 {
+                    let moved = (from[i] - to[i]).abs();
+                    assert!(moved <= doubt[i], "{faint}: {gradient:?} by {off}, {from:?} to {to:?}, {doubt:?}");
+                    used[i] = used[i].max(moved / doubt[i]);
+                }
+            }
+            assert!(used.iter().all(|used| *used > 0.8), "{faint}: {used:?}");
+        }
+    }
 }

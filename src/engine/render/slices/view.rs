@@ -36,7 +36,7 @@ pub(in crate::render) struct SlicedView {
     /// World units between voxels along b, c and a.
     spacing: [f64; 3],
     /// Standard deviation of the kernel along b, c and a, in voxels.
-    sigma: [f64; 3],
+    pub(super) sigma: [f64; 3],
     /// Voxels that the kernel reaches to either side, along b, c and a.
     pub(super) reach: [usize; 3],
     /// Cells per voxel along b and c.
@@ -342,6 +342,11 @@ impl SlicedView {
     /// The distance of two slices, in voxels along a.
     pub(super) fn between(&self) -> f64 {
         1.0 / self.slices_per_voxel() as f64
+    }
+
+    /// The same view with every slice a slab.
+    pub(super) fn slice_by_slice(&self) -> Self {
+        self.with_slices(self.slices_per_voxel()).0
     }
 
     /// The same view with `slices` slices per voxel, each a slab, and the number of slices of this view per slice of that one.

@@ -335,7 +335,8 @@ impl Ranges {
             }
         }
         if needed.errors {
-            let certified = RenderConfig { certify: true, frames: spread(scene, LEAST_FRAMES), ..small };
+            let (frames, mode) = (spread(scene, LEAST_FRAMES), config.mode.clone());
+            let certified = RenderConfig { certify: true, frames, mode, ..small };
             let report = pictures(
                 scene,
                 &certified,
