@@ -272,7 +272,6 @@ fn options_without_meaning_along_a_ray_are_refused() {
     };
     for (wrong, what) in [
         (with(&|c| c.kernel.tau = 0.1), "tau"),
-        (with(&|c| c.certify = true), "certify"),
         (with(&|c| c.quantity = Quantity::Emission), "quantity"),
         (with(&|c| c.mode = composite(Some(0))), "slices"),
         (with(&|c| c.mode = composite(Some(100_000))), "slices"),

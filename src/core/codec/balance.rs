@@ -9,7 +9,7 @@ use super::check::{RowStats, Tally};
 use super::field::Field;
 use super::load::Source;
 use super::refine::Coded;
-use super::shifts::{CompensatedSum, FrameRun, RUN, allowed_sum, shift_and_clip, spacing};
+use super::shifts::{CompensatedSum, FrameRun, RUN, allowed_sum, shift_and_clip, shift_singles, spacing};
 use super::sides::SidesOf;
 use crate::base::sample::{self, SampleType, join_ranges};
 use crate::base::vectors::dispatch;
@@ -31,6 +31,8 @@ struct Unbalanced<'a> {
 struct Frame<'a> {
     source: Vec<f64>,
     decoded: &'a [u8],
+    /// The decoded samples as numbers, if they are singles without sides.
+    singles: Vec<f64>,
     fixed: &'a [bool],
     /// As a reader returns them.
     samples: Vec<f64>,
@@ -84,7 +86,13 @@ impl<'a> Unbalanced<'a> {
     fn empty_frame(&self) -> Frame<'_> {
         let numbers = vec![0.0; self.of.voxels()];
         let codes = SumCodes { unit: self.unit, frames: vec![0], unshifted: Vec::new() };
-        Frame { source: numbers.clone(), decoded: &[], fixed: &[], samples: numbers, unsided: NOTHING, codes }
+        let singles = if self.is_of_singles() { numbers.clone() } else { Vec::new() };
+        Frame { source: numbers.clone(), decoded: &[], singles, fixed: &[], samples: numbers, unsided: NOTHING, codes }
+    }
+
+    /// Whether sums are found with numbers instead of bytes.
+    fn is_of_singles(&self) -> bool {
+        self.of.codec.sample == SampleType::F32 && self.of.codec.sides.is_empty()
     }
 
     fn load<'b>(&'b self, number: usize, frame: &mut Frame<'b>) {
@@ -94,6 +102,9 @@ impl<'a> Unbalanced<'a> {
         missing.for_each(|(_, source)| *source = 0.0);
         (frame.decoded, frame.fixed) =
             (&self.decoded[number * each..][..each], &self.fixed[number * voxels..][..voxels]);
+        if self.is_of_singles() {
+            sample::load(SampleType::F32, frame.decoded, &mut frame.singles);
+        }
         frame.codes.unshifted.clear();
     }
 
@@ -149,6 +160,11 @@ impl<'a> Unbalanced<'a> {
 
     /// The sum of a frame's errors with its code. Writes the frame's samples.
     fn sum(&self, frame: &mut Frame<'_>) -> f64 {
+        if self.is_of_singles() { frame.sum_of_singles(self.of.codec) } else { self.sum_of_any(frame) }
+    }
+
+    /// The same for all types, as readers do it.
+    fn sum_of_any(&self, frame: &mut Frame<'_>) -> f64 {
         let (codec, voxels, mut sum) = (self.of.codec, frame.source.len(), CompensatedSum::default());
         let (ty, mut bytes) = (codec.sample, [0; RUN * size_of::<f64>()]);
         frame.unsided = NOTHING;
@@ -190,6 +206,9 @@ fn sum_of_errors(samples: &[f64], source: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + last.iter().zip(of_last).map(|(sample, source)| sample - source).sum::<f64>()
 }
 
+/// The range of all samples.
+const EVERYTHING: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
 /// The range of no samples.
 const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
@@ -200,6 +219,25 @@ const TRIES: usize = 30;
 const CODES_TRIED: usize = 100;
 
 impl Frame<'_> {
+    /// [`Unbalanced::sum`] of singles without sides.
+    fn sum_of_singles(&mut self, codec: &WindowCodec) -> f64 {
+        let (by, clip) = (self.codes.frames[0] as f64 * self.codes.unit, codec.clip.unwrap_or(EVERYTHING));
+        let (mut sum, mut unshifted) = (CompensatedSum::default(), self.codes.unshifted.iter().peekable());
+        let mut fixed = self.fixed.chunks(RUN);
+        let runs = self.samples.chunks_mut(RUN).zip(self.source.chunks(RUN)).zip(self.singles.chunks(RUN));
+        for (first, ((samples, source), singles)) in (0..).step_by(RUN).zip(runs) {
+            dispatch!(shift_singles(singles, by, clip, &mut *samples));
+            while let Some(voxel) = unshifted.next_if(|voxel| (**voxel as usize) < first + samples.len()) {
+                let at = *voxel as usize - first;
+                shift_singles(&singles[at..=at], 0.0, clip, &mut samples[at..=at]);
+            }
+            let fixed = fixed.next().unwrap_or_default().iter().enumerate().filter(|(_, fixed)| **fixed);
+            fixed.for_each(|(at, _)| samples[at] = source[at]);
+            sum.add(dispatch!(sum_of_errors(&*samples, source))); // the rounding of so few is far below what is allowed
+        }
+        sum.total()
+    }
+
     /// Adds to the code what some samples will not be shifted by, spread over the others.
     fn add_to_others(&mut self, count: usize) -> Option<()> {
         let others = (self.source.len() - self.codes.unshifted.len()).saturating_sub(count).max(1);
@@ -212,7 +250,10 @@ impl Frame<'_> {
     fn beyond(&self, codec: &WindowCodec) -> Vec<u32> {
         let mut found = Vec::new();
         for (first, [samples, sources]) in self.rows().filter(|(_, [a, b])| !is_clear(codec, &row_stats(a, b))) {
-            for (at, (sample, source)) in samples.iter().zip(sources).enumerate() {
+            let clear = if codec.bound.is_same() && codec.missing_value.is_none() { codec.bound.delta } else { -1.0 };
+            let near =
+                samples.iter().zip(sources).enumerate().filter(|(_, (a, b))| !((*a - *b).abs().next_up() <= clear));
+            for (at, (sample, source)) in near {
                 let is_within = codec.error(*sample, *sample, *source) <= codec.bound.allowed(*source);
                 found.extend((!is_within && !self.fixed[first + at]).then_some((first + at) as u32));
             }

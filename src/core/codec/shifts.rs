@@ -140,6 +140,16 @@ fn shift(ty: SampleType, unit: f64, code: i64, run: FrameRun, values: &mut [f64]
     }
 }
 
+/// What [`shift_and_clip`] does to singles that are loaded as numbers, for the same shift of all.
+#[inline(always)]
+pub(super) fn shift_singles(singles: &[f64], by: f64, clip: (f64, f64), samples: &mut [f64]) {
+    for (sample, single) in samples.iter_mut().zip(singles) {
+        let shifted = f64::from((single + by) as f32);
+        let least = if shifted < clip.0 { clip.0 } else { shifted };
+        *sample = if least > clip.1 { clip.1 } else { least };
+    }
+}
+
 /// The least number above 0.618 `voxels` without a common divisor with it: its multiples spread over the voxels.
 fn stride(voxels: u64) -> u64 {
     let divisor = |of: u64| std::iter::successors(Some([voxels, of]), |[a, b]| (*b > 0).then(|| [*b, a % b])).last();
@@ -169,6 +179,25 @@ mod tests {
             assert!(all.iter().all(|v| (v - code as f64 / voxels as f64).abs() < 1.0), "{all:?}");
             assert!(of(0, voxels).iter().zip(&all_of(code + 1)).all(|(a, b)| a <= b), "a larger code");
             (0..=voxels).for_each(|at| assert_eq!([of(0, at), of(at, voxels - at)].concat(), all));
+        }
+    }
+
+    #[test]
+    fn numbers_of_singles_are_shifted_as_their_bytes_are() {
+        let singles = Vec::from_iter((0..700).map(|n| f64::from((f64::from(n * 7919 % 701) * 0.37 - 120.0) as f32)));
+        for (unit, code, clip) in [(1e-7, 12_345, None), (0.25, -9, Some((-100.0, 60.0))), (1e30, 1 << 40, None)] {
+            let mut bytes = vec![0; singles.len() * 4];
+            sample::store(SampleType::F32, &singles, &mut bytes);
+            let codes = SumCodes { unit, frames: vec![code], unshifted: Vec::new() };
+            add_shifts(SampleType::F32, &codes, FrameRun { frame: 0, first: 0, voxels: 700 }, &mut bytes);
+            if let Some((lo, hi)) = clip {
+                sample::clip(SampleType::F32, lo, hi, &mut bytes);
+            }
+            let [mut expected, mut found] = [(); 2].map(|()| vec![0.0; singles.len()]);
+            sample::load(SampleType::F32, &bytes, &mut expected);
+            let clip = clip.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+            shift_singles(&singles, code as f64 * unit, clip, &mut found);
+            assert_eq!(expected, found);
         }
     }
 
