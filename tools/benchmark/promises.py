@@ -5,6 +5,7 @@
     python tools/benchmark/promises.py BIN ARCHIVE.npy ...
 
 BIN is the folder of wavesplat's programs. Prints a row of tools/benchmark/promises.md for each archive (t, z, y, x), tolerance and promise.
+With `--computed`, prints the errors of what is computed from the samples instead, without a promise and with several, and compares no peer.
 """
 
 import argparse
@@ -92,6 +93,44 @@ def rows_of(archive, args):
                 yield cells
 
 
+def rms(numbers):
+    return float(np.sqrt(np.mean(np.square(numbers))))
+
+
+def laplacian(series):
+    inside = series[:, 1:-1, 1:-1, 1:-1]
+    around = sum(np.roll(series, by, axis)[:, 1:-1, 1:-1, 1:-1] for axis in (1, 2, 3) for by in (-1, 1))
+    return around - 6 * inside
+
+
+def computed_errors(series, decoded, value):
+    """Errors of differences between frames, gradients and Laplacians as shares of these; the largest of the mean of a frame as a share of the
+    range; the edges between neighbours along x that cross a value in only one of both, as a share."""
+    both = [series, decoded]
+    results = {"difference": [np.diff(a, axis=0) for a in both], "gradient": [np.gradient(a, axis=3) for a in both]}
+    results["laplacian"] = [laplacian(a) for a in both]
+    shares = [rms(b - a) / rms(a) for a, b in results.values()]
+    mean = np.abs(np.mean(decoded - series, axis=(1, 2, 3))).max() / (series.max() - series.min())
+    crossed = [np.diff(a > value, axis=3) for a in both]
+    return [f"{100 * share:.2f} %" for share in shares] + [f"{mean:.1e}", f"{100 * np.sum(crossed[0] != crossed[1]) / np.sum(crossed[0]):.2f} %"]
+
+
+def computed_rows(archive, args):
+    stored = np.load(archive)
+    series = stored.astype(np.float64)
+    low, high = series.min(), series.max()
+    value = float(stored.dtype.type(np.quantile(series[::2, ::2, ::2, ::2], 0.9)))
+    name = os.path.splitext(os.path.basename(archive))[0]
+    with tempfile.TemporaryDirectory(dir=args.work) as work:
+        programs = Programs(args.bin, archive, work, 1)
+        for tolerance in args.tolerances.split(","):
+            bound = float(tolerance) * (high - low)
+            gradient = f"difference={bound / 2},gradient={bound / 4}"
+            for what, keep in {"nothing": None, "sum, side": f"sum side={value!r}", "difference, gradient": gradient.replace(",", " ")}.items():
+                size, _, _ = programs.measured(tolerance, keep)
+                yield [name, tolerance, what, str(size), *computed_errors(series, np.load(programs.back).astype(np.float64), value)]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("bin", metavar="BIN", help="the folder of wavesplat's programs")
@@ -99,13 +138,18 @@ def main():
     parser.add_argument("--tolerances", default="1e-2,1e-3")
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--alone", action="store_true", help="without SZ3")
+    parser.add_argument("--computed", action="store_true", help="errors of what is computed from the samples")
     parser.add_argument("--work", help="a folder for files, such as one in memory")
     args = parser.parse_args()
-    heads = ["data", "tolerance", "kept", "bytes without", "more bytes", "convert, times", "extract, times"]
-    heads += ["safeguarded SZ3 / kept, bytes", "its time / convert"]
+    heads = ["data", "tolerance", "kept"]
+    if args.computed:
+        heads += ["bytes", "difference", "gradient", "laplacian", "mean of a frame", "edges at the value"]
+    else:
+        heads += ["bytes without", "more bytes", "convert, times", "extract, times"]
+        heads += ["safeguarded SZ3 / kept, bytes", "its time / convert"]
     print("| " + " | ".join(heads) + " |\n|---|---|---|" + "--:|" * 6)
     for archive in args.archives:
-        for cells in rows_of(archive, args):
+        for cells in (computed_rows if args.computed else rows_of)(archive, args):
             print("| " + " | ".join(cells) + " |", flush=True)
 
 

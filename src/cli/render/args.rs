@@ -38,8 +38,8 @@ Examples:
   wavesplat-render run.wspl --region 0:32,:,: --partial -o part-1.wpart
   wavesplat-render --sum part-1.wpart part-2.wpart -o picture.png",
     after_help = "\
-An .npy holds float32 values (frames, height, width) in units of --quantity, with NaN for background; with --colormap it \
-holds uint8 colours. A PNG stores its render settings as text, an .exr as comments. \
+An .npy holds float32 values (frames, height, width) in units of --quantity, with NaN for background; of composites and isosurfaces \
+(frames, height, width, 4), light and opacity; with --colormap uint8 colours. A PNG stores its render settings as text, an .exr as comments. \
 View 0,0 looks along -y with z up. Azimuth turns the camera about z, counter-clockwise seen from above: 90,0 looks \
 along x. A tau of about 1 / the volume's depth makes the near side stand out."
 )]

@@ -34,6 +34,10 @@ struct Frame<'a> {
     /// The decoded samples as numbers, if they are singles without sides.
     singles: Vec<f64>,
     fixed: &'a [bool],
+    /// The voxels that are.
+    fixed_voxels: Vec<u32>,
+    /// Statistics of rows of the samples that were last compared with their bounds.
+    stats: Vec<RowStats>,
     /// As a reader returns them.
     samples: Vec<f64>,
     /// The range of the samples before they go to their sides, if some may: readers clamp to the range of the window's.
@@ -87,7 +91,17 @@ impl<'a> Unbalanced<'a> {
         let numbers = vec![0.0; self.of.voxels()];
         let codes = SumCodes { unit: self.unit, frames: vec![0], unshifted: Vec::new() };
         let singles = if self.is_of_singles() { numbers.clone() } else { Vec::new() };
-        Frame { source: numbers.clone(), decoded: &[], singles, fixed: &[], samples: numbers, unsided: NOTHING, codes }
+        Frame {
+            source: numbers.clone(),
+            decoded: &[],
+            singles,
+            fixed: &[],
+            fixed_voxels: Vec::new(),
+            stats: Vec::new(),
+            samples: numbers,
+            unsided: NOTHING,
+            codes,
+        }
     }
 
     /// Whether sums are found with numbers instead of bytes.
@@ -102,6 +116,9 @@ impl<'a> Unbalanced<'a> {
         missing.for_each(|(_, source)| *source = 0.0);
         (frame.decoded, frame.fixed) =
             (&self.decoded[number * each..][..each], &self.fixed[number * voxels..][..voxels]);
+        let fixed = (0..).zip(frame.fixed).filter(|(_, fixed)| **fixed);
+        frame.fixed_voxels.clear();
+        frame.fixed_voxels.extend(fixed.map(|(voxel, _)| voxel));
         if self.is_of_singles() {
             sample::load(SampleType::F32, frame.decoded, &mut frame.singles);
         }
@@ -130,7 +147,7 @@ impl<'a> Unbalanced<'a> {
     /// frame's samples.
     fn find_code(&self, frame: &mut Frame<'_>) -> Option<()> {
         let (codec, voxels) = (self.of.codec, frame.source.len());
-        let free = voxels - frame.fixed.iter().filter(|fixed| **fixed).count();
+        let free = voxels - frame.fixed_voxels.len();
         let allowed = allowed_sum(codec.sample, self.of.missing.magnitude, codec.bound.delta, free) / 2.0; // readers add in another order
         let shifted = free.saturating_sub(frame.codes.unshifted.len()).max(1) as f64;
         let per_code = if codec.sample.is_float() { shifted * self.unit } else { shifted / voxels as f64 };
@@ -222,8 +239,8 @@ impl Frame<'_> {
     /// [`Unbalanced::sum`] of singles without sides.
     fn sum_of_singles(&mut self, codec: &WindowCodec) -> f64 {
         let (by, clip) = (self.codes.frames[0] as f64 * self.codes.unit, codec.clip.unwrap_or(EVERYTHING));
-        let (mut sum, mut unshifted) = (CompensatedSum::default(), self.codes.unshifted.iter().peekable());
-        let mut fixed = self.fixed.chunks(RUN);
+        let (mut unshifted, mut fixed) = (self.codes.unshifted.iter().peekable(), self.fixed_voxels.iter().peekable());
+        let mut sum = CompensatedSum::default();
         let runs = self.samples.chunks_mut(RUN).zip(self.source.chunks(RUN)).zip(self.singles.chunks(RUN));
         for (first, ((samples, source), singles)) in (0..).step_by(RUN).zip(runs) {
             dispatch!(shift_singles(singles, by, clip, &mut *samples));
@@ -231,8 +248,10 @@ impl Frame<'_> {
                 let at = *voxel as usize - first;
                 shift_singles(&singles[at..=at], 0.0, clip, &mut samples[at..=at]);
             }
-            let fixed = fixed.next().unwrap_or_default().iter().enumerate().filter(|(_, fixed)| **fixed);
-            fixed.for_each(|(at, _)| samples[at] = source[at]);
+            while let Some(voxel) = fixed.next_if(|voxel| (**voxel as usize) < first + samples.len()) {
+                let at = *voxel as usize - first;
+                samples[at] = source[at];
+            }
             sum.add(dispatch!(sum_of_errors(&*samples, source))); // the rounding of so few is far below what is allowed
         }
         sum.total()
@@ -246,18 +265,24 @@ impl Frame<'_> {
         Some(())
     }
 
-    /// The voxels whose samples are beyond their bound.
-    fn beyond(&self, codec: &WindowCodec) -> Vec<u32> {
-        let mut found = Vec::new();
-        for (first, [samples, sources]) in self.rows().filter(|(_, [a, b])| !is_clear(codec, &row_stats(a, b))) {
-            let clear = if codec.bound.is_same() && codec.missing_value.is_none() { codec.bound.delta } else { -1.0 };
-            let near =
-                samples.iter().zip(sources).enumerate().filter(|(_, (a, b))| !((*a - *b).abs().next_up() <= clear));
-            for (at, (sample, source)) in near {
+    /// The voxels whose samples are beyond their bound. Keeps the statistics of all rows.
+    fn beyond(&mut self, codec: &WindowCodec) -> Vec<u32> {
+        let (mut found, mut stats) = (Vec::new(), std::mem::take(&mut self.stats));
+        stats.clear();
+        stats.extend(self.rows().map(|(_, [samples, source])| row_stats(samples, source)));
+        // Samples that are off by no more are within their bound.
+        let clear = if codec.bound.is_same() && codec.missing_value.is_none() { codec.bound.delta } else { -1.0 };
+        let unclear = self.rows().zip(&stats).filter(|(_, stats)| !is_clear(codec, stats));
+        for ((first, [samples, sources]), _) in unclear {
+            for (at, (sample, source)) in samples.iter().zip(sources).enumerate() {
+                if (sample - source).abs().next_up() <= clear {
+                    continue;
+                }
                 let is_within = codec.error(*sample, *sample, *source) <= codec.bound.allowed(*source);
                 found.extend((!is_within && !self.fixed[first + at]).then_some((first + at) as u32));
             }
         }
+        self.stats = stats;
         found
     }
 
@@ -265,10 +290,9 @@ impl Frame<'_> {
     fn tally(&self, of: &Source<'_>, number: usize, tally: &mut Tally) {
         let (codec, place) = (of.codec, number * self.source.len());
         (tally.min, tally.max) = join_ranges((tally.min, tally.max), self.unsided);
-        for (first, [samples, sources]) in self.rows() {
-            let stats = row_stats(samples, sources);
-            if of.missing.count == 0 && is_clear(codec, &stats) {
-                tally.add_row(&stats, codec.bound.largest_share(&[stats.largest], 1));
+        for ((first, [samples, sources]), stats) in self.rows().zip(&self.stats) {
+            if of.missing.count == 0 && is_clear(codec, stats) {
+                tally.add_row(stats, codec.bound.largest_share(&[stats.largest], 1));
                 continue;
             }
             for (at, (sample, source)) in samples.iter().zip(sources).enumerate() {
@@ -298,17 +322,46 @@ fn row_stats(samples: &[f64], source: &[f64]) -> RowStats {
     dispatch!(stats_of_row(samples, source))
 }
 
+/// The statistics of a row, in parts: part l has every sample whose number leaves the rest l.
+struct Lanes {
+    min: [f64; LANES],
+    max: [f64; LANES],
+    largest: [f64; LANES],
+    squares: [f64; LANES],
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn add(&mut self, l: usize, sample: f64, source: f64) {
+        let error = (sample - source).abs();
+        self.largest[l] = if error > self.largest[l] { error } else { self.largest[l] };
+        self.squares[l] += error * error;
+        self.min[l] = if sample < self.min[l] { sample } else { self.min[l] };
+        self.max[l] = if sample > self.max[l] { sample } else { self.max[l] };
+    }
+}
+
 #[inline(always)]
 fn stats_of_row(samples: &[f64], source: &[f64]) -> RowStats {
-    let mut found = RowStats { min: f64::INFINITY, max: f64::NEG_INFINITY, largest: 0.0, squares: 0.0 };
-    for (sample, source) in samples.iter().zip(source) {
-        let error = (sample - source).abs();
-        found.largest = if error <= found.largest { found.largest } else { error }; // keeps NaN
-        found.squares += error * error;
-        found.min = if *sample < found.min { *sample } else { found.min };
-        found.max = if *sample > found.max { *sample } else { found.max };
+    let mut lanes = Lanes {
+        min: [f64::INFINITY; LANES],
+        max: [f64::NEG_INFINITY; LANES],
+        largest: [0.0; LANES],
+        squares: [0.0; LANES],
+    };
+    let (some, last) = samples.as_chunks::<LANES>();
+    let (of_some, of_last) = source.as_chunks::<LANES>();
+    for (samples, source) in some.iter().zip(of_some) {
+        for l in 0..LANES {
+            lanes.add(l, samples[l], source[l]);
+        }
     }
-    found
+    last.iter().zip(of_last).enumerate().for_each(|(l, (sample, source))| lanes.add(l, *sample, *source));
+    let squares: f64 = lanes.squares.iter().sum();
+    let largest = if squares.is_nan() { f64::NAN } else { lanes.largest.into_iter().fold(0.0, f64::max) };
+    let (min, max) =
+        (lanes.min.into_iter().fold(f64::INFINITY, f64::min), lanes.max.into_iter().fold(f64::NEG_INFINITY, f64::max));
+    RowStats { min, max, largest, squares }
 }
 
 /// A code between two, by bisection or false position.

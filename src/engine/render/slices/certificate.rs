@@ -152,7 +152,8 @@ impl Blend for Certificate<'_> {
                 (0..4).for_each(|i| sums[i] += (across * down).abs() * cell[i]);
             }
         }
-        let error = sums.into_iter().fold(0.0, f32::max) + OF_PIXEL;
+        let largest = sums.into_iter().fold(0.0, f32::max);
+        let error = if largest == 0.0 { 0.0 } else { largest + OF_PIXEL }; // nothing is seen where there is no error
         out.fill(if error < 1.0 { error } else { 1.0 }); // light and opacity are from 0 to 1
     }
 

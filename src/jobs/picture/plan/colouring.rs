@@ -12,7 +12,7 @@ use crate::picture::values::{ModeName, Theme};
 use serde::Serialize;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
-use wavesplat_core::colour::{Distribution, Norm, Rgb, Scale, TransferFunction};
+use wavesplat_core::colour::{Clear, Distribution, Norm, Rgb, Scale, TransferFunction};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::render::sink::PictureFormat;
 use wavesplat_engine::render::{Mode, Pixel, Quantity, RenderConfig, Scene};
@@ -82,7 +82,10 @@ impl ColouringInput<'_> {
         let found = Needed { pictures: in_colours && fixed.is_none(), errors: errors_in_colours };
         report_ranges(range, &ranges, found, reporter);
         let scale = |range, norm| Scale::new(&map, range, norm, background(request));
-        let (picture_scale, error_scale) = (scale(range, norm)?, scale(ranges.errors, Norm::Linear)?);
+        // Where no ray meets anything, a composite has no error, and shows the background.
+        let clear = (pixel == Pixel::Light).then_some(Clear { lo: 0.0, hi: 0.0, fade: 0.0 });
+        let error_scale = scale(ranges.errors, Norm::Linear)?.with_clear(clear);
+        let picture_scale = scale(range, norm)?;
         let may_be_clear = in_colours && self.may_be_clear(pixel);
         let clear = may_be_clear.then(|| clear_values(request, &ranges, range, reporter)).flatten();
         let picture_scale = picture_scale.with_clear(clear);

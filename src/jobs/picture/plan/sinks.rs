@@ -76,12 +76,17 @@ impl SinkInput<'_> {
     /// The settings of the sinks of errors.
     fn error_config(&self, errors: &Targets, sink_config: &SinkConfig) -> SinkConfig {
         let Colouring { pixel, error_scale, .. } = self.colouring;
+        let values = |annotation: Annotation| match pixel {
+            Pixel::Light => Annotation { values: "certified error of light".into(), ..annotation },
+            Pixel::Value | Pixel::Channels => annotation,
+        };
         SinkConfig {
             format: errors.format,
             provenance: Arc::new(error_provenance(self.provenance, self.colouring)),
             pixel: if *pixel == Pixel::Light { Pixel::Value } else { *pixel },
             colours: error_scale.clone(),
             coloured_array: false,
+            annotation: sink_config.annotation.clone().map(values),
             ..sink_config.clone()
         }
     }
