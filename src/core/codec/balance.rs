@@ -34,7 +34,7 @@ struct Frame<'a> {
     /// The decoded samples as numbers, if they are singles without sides.
     singles: Vec<f64>,
     fixed: &'a [bool],
-    /// The voxels that are.
+    /// The voxels whose samples are fixed.
     fixed_voxels: Vec<u32>,
     /// Statistics of rows of the samples that were last compared with their bounds.
     stats: Vec<RowStats>,
@@ -322,7 +322,7 @@ fn row_stats(samples: &[f64], source: &[f64]) -> RowStats {
     dispatch!(stats_of_row(samples, source))
 }
 
-/// The statistics of a row, in parts: part l has every sample whose number leaves the rest l.
+/// The statistics of a row in [`LANES`] parts: part l covers the samples l, l + LANES, l + 2 LANES and so on.
 struct Lanes {
     min: [f64; LANES],
     max: [f64; LANES],

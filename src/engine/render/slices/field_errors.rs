@@ -48,8 +48,8 @@ impl<'a> FieldErrors<'a> {
         Self { view, blocks, near, of_frames, most, of_gradient, of_absence }
     }
 
-    /// The error of the gradient per world unit, for samples off by at most `error` and a kernel of which this share is present (eq 41): the
-    /// derivatives of the weights are divided by the share, and where it changes, the error of the mean counts as well.
+    /// Bounds the error of the gradient (eq 41), in units per world unit. Samples are off by at most `error`; `present` is the share of the
+    /// kernel's weights that meet samples. The gradient is divided by this share. Where the share changes, the error of the mean adds to it.
     #[inline(always)]
     pub(super) fn of_gradient(&self, error: f32, present: f32) -> f32 {
         let mean = (self.of_absence * (1.0 - present)).clamp(0.0, 1.0);
