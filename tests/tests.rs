@@ -7,7 +7,6 @@ mod adversary; // series made to break a bound by someone who knows the encoder
 mod bounds; // random series of every kind and type against the error bounds
 mod catalogue; // what is guaranteed for each kind of difficult number
 mod certificates; // no pixel is further from the truth than its certificate says
-mod composite_certificates; // nor is any of a composite from that of an original
 mod channels; // files of colours keep the bound in every channel
 mod citations; // every citation leads to a work, a file or an equation
 mod cli; // the programs from outside: arguments, files, pipes, messages, exit codes
@@ -27,6 +26,7 @@ mod lattice; // splatting on the lattice of the view against footprints
 mod layering; // which module may use which, and which crate
 mod levels_of_detail; // every 2^lod-th voxel has the same bits as in the whole volume
 mod library_use; // the library as another program uses it
+mod light_certificates; // nor is any of a composite or of surfaces from that of an original
 mod max_error; // errors in the samples' unit
 mod omitted_levels; // what leaving out levels of a pyramid changes
 mod overview; // overviews against whole decoding

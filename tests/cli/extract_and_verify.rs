@@ -34,6 +34,45 @@ fn verify_compares_with_the_source() {
     work.wavesplat("verify a.wspl --against raw --dims 20x14x10x40 --dtype f32").ok();
 }
 
+/// The errors of differences between frames and of means, from extracted samples.
+#[test]
+fn reports_tell_what_becomes_of_results() {
+    let work = Work::new();
+    let archive = Archive::smooth([8, 7, 6], 8);
+    work.write("a.npy", archive.npy());
+    let report = work.wavesplat("convert a.npy -o a.wspl --tolerance 0.02 --keep side=0.5 --json").ok().json();
+    work.wavesplat("extract a.wspl -o b.npy").ok();
+    let decoded = floats(&read_npy(&work.read("b.npy")).1);
+    let [source, decoded] = [&archive.values, &decoded].map(|all| Vec::from_iter(all.iter().map(|v| f64::from(*v))));
+    let voxels = 8 * 7 * 6;
+    let differences = |all: &[f64]| Vec::from_iter((voxels..all.len()).map(|i| all[i] - all[i - voxels]));
+    let rms = |all: Vec<f64>| (all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64).sqrt();
+    let [a, b] = [&source, &decoded].map(|all| differences(all));
+    let share = rms(a.iter().zip(&b).map(|(a, b)| b - a).collect()) / rms(a.clone());
+    let frames = source.chunks(voxels).zip(decoded.chunks(voxels));
+    let mean =
+        frames.map(|(a, b)| (a.iter().sum::<f64>() - b.iter().sum::<f64>()).abs() / voxels as f64).fold(0.0, f64::max);
+    for results in [&report["results"], &work.wavesplat("verify a.wspl --against a.npy --json").ok().json()["results"]]
+    {
+        let near = |name: &str, truth: f64| (results[name].as_f64().unwrap() - truth).abs() < 1e-6 * truth;
+        assert!(near("difference", share) && near("mean", mean) && share > 1e-3, "{results}, not {share}, {mean}");
+        assert!(results["laplacian"].as_f64() > results["gradient"].as_f64());
+        assert_eq!(results["sides"], serde_json::json!([0.0]));
+    }
+    let line = "of what is computed: differences off by ";
+    let told = |run: &str, is_told: bool| {
+        let ran = work.wavesplat(run).ok();
+        assert_eq!(format!("{}{}", ran.err, ran.text()).contains(line), is_told, "{run}");
+    };
+    told("verify a.wspl --against a.npy", true);
+    told("verify a.wspl", false);
+    told("convert a.npy -o c.wspl -v", true);
+    told("convert a.npy -o d.wspl", false);
+    told("convert a.npy -o e.wspl -v --transfer-function turbo", false);
+    let piped = work.piped("convert - -o f.wspl --json", &archive.npy()).ok().json();
+    assert!(piped["results"].is_null() && piped["frames"] == 8);
+}
+
 #[test]
 fn verify_finds_one_altered_sample() {
     let work = Work::with_file("");

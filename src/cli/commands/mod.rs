@@ -7,6 +7,7 @@ mod extract;
 mod info;
 mod merge;
 mod recover;
+mod results;
 mod scan;
 mod several;
 mod verify;

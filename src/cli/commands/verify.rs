@@ -1,14 +1,15 @@
 //! `wavesplat verify`
 
-use crate::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
+use super::results::{results_text, source_of};
+use crate::{CommonArgs, FrameRange, InputArgs, RemoteArgs, print};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::source::FrameSource;
-use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::convert::errors_of_results;
+use wavesplat_engine::convert::estimate::EstimatedErrors;
 use wavesplat_engine::file::report::{BoundReport, largest_bound};
-use wavesplat_engine::file::shard::frames_of_shard;
 use wavesplat_engine::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat_format::Keep;
 
@@ -51,22 +52,34 @@ struct Reported<'a> {
     promise: BoundReport,
     /// The largest error, or root mean square, that any window allows.
     delta: f64,
+    /// Errors of what is computed from the samples, estimated from some blocks of an undamaged file and its source.
+    results: Option<EstimatedErrors>,
 }
 
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     args.common.start()?;
     let file = args.remote.open(&args.file, args.input.access())?;
-    let mut source = args.source(&file)?;
-    let source: Option<&mut dyn FrameSource> = match &mut source {
+    let mut source = match args.against.as_slice() {
+        [] => None,
+        inputs => Some(source_of(&file, &args.input, inputs, args.frames, &args.common)?),
+    };
+    let compared: Option<&mut dyn FrameSource> = match &mut source {
         Some(source) => Some(source.as_mut()),
         None => None,
     };
-    let report = verify(&file, source, args.common.memory.0, &args.common.progress("verify", "blocks"))?;
+    let memory = args.common.memory.0;
+    let report = verify(&file, compared, memory, &args.common.progress("verify", "blocks"))?;
+    let results = match &mut source {
+        Some(source) if report.damaged == 0 => errors_of_results(&file, source.as_mut(), memory)?,
+        _ => None,
+    };
     let (promise, delta) = (BoundReport::from_metadata(file.metadata()), largest_bound(file.metadata()));
+    let keep = file.metadata().keep();
     if args.common.json {
-        args.common.report(&Reported { report: &report, promise, delta }, false)?;
+        args.common.report(&Reported { report: &report, promise, delta, results }, false)?;
     } else if !args.common.quiet {
-        print(&summary(&report, &promise, &file.metadata().keep()))?;
+        let text = results.as_ref().map(|results| results_text(results, &keep.sides, promise.units.as_deref()) + "\n");
+        print(&(summary(&report, &promise, &keep) + &text.unwrap_or_default()))?;
     }
     if report.damaged > 0 {
         let (count, first) = (report.damaged, &report.damage[0]);
@@ -96,24 +109,6 @@ fn missed(c: &Comparison) -> Option<String> {
     Some(format!(
         "blocks with errors above those stated in the file: {blocks}, the first is block {block} of window {window}{channel}"
     ))
-}
-
-impl VerifyArgs {
-    fn source(&self, file: &CoefficientFile) -> Result<Option<Box<dyn FrameSource>>> {
-        if self.against.is_empty() {
-            return Ok(None);
-        }
-        let source = self.input.open_again(file, &self.against, self.frames, &self.common)?;
-        // Appended frames may come from the same archive: then all its frames count, not those converted first.
-        let is_all = self.frames.is_some() || source.archive().frames == Some(file.frames());
-        if is_all {
-            return Ok(Some(source));
-        }
-        let source = narrow(source, remembered(file, "frames")?, None)?;
-        let shard =
-            frames_of_shard(file).filter(|(_, all)| source.archive().frames.map(|frames| frames as u64) == Some(*all));
-        narrow(source, shard.map(|(frames, _)| frames.into()), None).map(Some)
-    }
 }
 
 fn places(count: u64) -> String {

@@ -1,5 +1,6 @@
 //! Measures the errors of what is computed from the samples of a block, as a reader decodes them.
 
+use super::WindowCodec;
 use super::derived::{Computed, DerivedErrors, FramePair};
 use super::load::Source;
 use crate::base::sample;
@@ -8,29 +9,34 @@ use crate::base::sample;
 const FRAMES_MEASURED: usize = 8;
 
 impl Computed {
-    /// The errors in some frames of a block with these decoded samples.
-    pub(super) fn errors_in(&self, block: &Source<'_>, decoded: &[u8]) -> DerivedErrors {
-        let source = block.samples.contiguous();
-        let each = block.voxels() * block.codec.sample.size();
+    /// The errors in some frames of a block of `size` voxels: the bytes of its samples in the source, and as they are decoded.
+    pub fn errors(&self, codec: &WindowCodec, size: [usize; 3], [source, decoded]: [&[u8]; 2]) -> DerivedErrors {
+        let each = size.iter().product::<usize>() * codec.sample.size();
         let pair = |frame: usize| {
-            [&source[..], decoded].map(|samples| numbers(block, &samples[frame * each..][..each], frame))
+            let [mut source, mut decoded] =
+                [source, decoded].map(|samples| numbers(codec, &samples[frame * each..][..each]));
+            for (source, decoded) in source.iter_mut().zip(&mut decoded).filter(|(s, _)| codec.is_missing(**s)) {
+                [*source, *decoded] = [f64::NAN; 2];
+            }
+            [source, decoded]
         };
-        let (frames, mut found) = (block.codec.frames(), DerivedErrors::default());
+        let (frames, mut found) = (codec.frames(), DerivedErrors::default());
         for frame in (0..frames).rev().step_by(frames.div_ceil(FRAMES_MEASURED)) {
             let (now, before) = (pair(frame), frame.checked_sub(1).map(pair));
             let before = before.as_ref().map(|[source, decoded]| FramePair { source, decoded });
-            found.add_frame(self, block.samples.size(), FramePair { source: &now[0], decoded: &now[1] }, before);
+            found.add_frame(self, size, FramePair { source: &now[0], decoded: &now[1] }, before);
         }
         found
     }
+
+    /// The same of a block in work.
+    pub(super) fn errors_in(&self, block: &Source<'_>, decoded: &[u8]) -> DerivedErrors {
+        self.errors(block.codec, block.samples.size(), [&block.samples.contiguous(), decoded])
+    }
 }
 
-/// The samples of a frame as numbers; missing ones are NaN.
-fn numbers(block: &Source<'_>, samples: &[u8], frame: usize) -> Vec<f64> {
-    let (ty, first) = (block.codec.sample, frame * block.voxels());
-    let mut numbers = vec![0.0; samples.len() / ty.size()];
-    sample::load(ty, samples, &mut numbers);
-    let missing = numbers.iter_mut().enumerate().filter(|(at, _)| block.missing.has(first + at));
-    missing.for_each(|(_, number)| *number = f64::NAN);
+fn numbers(codec: &WindowCodec, samples: &[u8]) -> Vec<f64> {
+    let mut numbers = vec![0.0; samples.len() / codec.sample.size()];
+    sample::load(codec.sample, samples, &mut numbers);
     numbers
 }

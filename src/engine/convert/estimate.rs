@@ -59,13 +59,13 @@ pub struct Estimate {
     pub blocks: usize,
     /// Windows with coded blocks.
     pub windows: usize,
-    /// Errors of what is computed from the samples of the coded blocks; `None` of colours.
+    /// Errors of what is computed from the samples of the coded blocks if these keep only their bound; `None` of colours.
     pub results: Option<EstimatedErrors>,
     /// Bytes of the coefficient file with what is to be kept; `None` if nothing is.
     pub kept_bytes: Option<u64>,
 }
 
-/// Errors of what is computed from samples that keep only their bound.
+/// Errors of what is computed from decoded samples.
 #[derive(Debug, Clone, Serialize)]
 pub struct EstimatedErrors {
     /// The root mean square of the errors of differences between frames, as a share of that of the differences; `None` if these are 0.
@@ -84,7 +84,7 @@ pub struct EstimatedErrors {
 }
 
 impl EstimatedErrors {
-    fn new(of: &DerivedErrors) -> Self {
+    pub(super) fn new(of: &DerivedErrors) -> Self {
         let [difference, gradient, laplacian] = [of.difference, of.gradient, of.laplacian].map(ResultErrors::share);
         let sides = of.crossings.iter().map(|crossings| crossings.share()).collect();
         Self { difference, gradient, laplacian, mean: of.mean, overshoot: of.overshoot, sides }
@@ -172,7 +172,7 @@ fn blocks_of_window(all: usize, windows: usize) -> usize {
 }
 
 /// All blocks if they are few, else up to `most`, spread evenly over the volume.
-fn some_blocks(blocks: &BlockGrid, most: usize) -> Vec<usize> {
+pub(super) fn some_blocks(blocks: &BlockGrid, most: usize) -> Vec<usize> {
     if blocks.len() <= most {
         return (0..blocks.len()).collect();
     }

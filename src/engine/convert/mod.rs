@@ -29,6 +29,7 @@ mod plan;
 mod pool;
 mod record;
 mod request;
+mod results;
 mod run;
 #[doc(hidden)]
 pub mod sampled;
@@ -47,10 +48,12 @@ use coarse::CoarseBlocks;
 use coded_input::CodedInput;
 pub use coding::{BestFor, SchemeConstraint, SpatialPredictor};
 use crossbeam_channel::bounded;
+use estimate::EstimatedErrors;
 pub use max_error::MaxError;
 use plan::Plan;
 use record::WindowWriter;
 pub use request::ConvertRequest;
+pub use results::errors_of_results;
 pub use run::{Failure, append, run};
 use serde::Serialize;
 use std::io::Write;
@@ -231,6 +234,10 @@ pub struct ConvertReport {
     /// Typical variation over time: the median, over the voxels that change, of the standard deviation within a window.
     /// Estimated from some voxels of every window converted now. `None` if no voxel changes.
     pub typical_variation: Option<f64>,
+    /// Errors of what is computed from the samples of some blocks, if [they are asked for](ConvertRequest::measures), unless the source is a
+    /// stream or the samples are colours.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub results: Option<EstimatedErrors>,
     /// Warnings, with what to change.
     #[serde(skip)]
     pub warnings: Vec<Note>,

@@ -209,6 +209,7 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         let largest = |part: fn(&Window) -> f64| windows.iter().map(part).fold(0.0, f64::max);
         let [read_seconds, encode_seconds, write_seconds, seconds] = seconds.map(|d| d.as_secs_f64());
         ConvertReport {
+            results: None,
             frames: *frames,
             frames_before: self.frames_before,
             windows: windows.len(),

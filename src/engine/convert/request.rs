@@ -62,6 +62,8 @@ pub struct ConvertRequest {
     pub shard: Option<Shard>,
     /// The file of an [`ArchiveScan`]: it gives `range`. Default: none.
     pub scan: Option<PathBuf>,
+    /// Whether the report tells the errors of what is computed from the samples. It takes reading some blocks again. Default: no.
+    pub measures: bool,
     /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,
     /// Names and values of the options that opened and narrowed the source, which the file keeps. Default: none.
@@ -88,6 +90,7 @@ impl Default for ConvertRequest {
             chain: CHAIN,
             shard: None,
             scan: None,
+            measures: false,
             memory: memory::DEFAULT,
             input: Vec::new(),
         }

@@ -2,7 +2,7 @@
 
 use super::coded_input::CodedInput;
 use super::plan::Plan;
-use super::{ConvertConfig, ConvertReport, ConvertRequest, ResumePoint, Target, convert_into};
+use super::{ConvertConfig, ConvertReport, ConvertRequest, ResumePoint, Target, convert_into, errors_of_results};
 use crate::file::CoefficientFile;
 use crate::file::resume::{self, IfUnfinished};
 use std::path::{Path, PathBuf};
@@ -50,7 +50,11 @@ pub fn run(
     let (out, complete) = resume::open(output, replace, if_unfinished)?;
     let resume_from = complete.map(|complete| ResumePoint { complete, first_window: 0, description: None });
     let target = Target { name: output, out, resume_from };
-    finish(source.as_mut(), &config, target, progress, || Ok(())).map(Some)
+    let report = finish(source.as_mut(), &config, target, progress, || Ok(()))?;
+    // A stream cannot be read again.
+    let mut errors = || errors_of_results(&CoefficientFile::open(output)?, source.as_mut(), request.memory);
+    let results = if request.measures { errors().unwrap_or_default() } else { None };
+    Ok(Some(ConvertReport { results, ..report }))
 }
 
 /// Adds frames to a finished file, in windows after its own. Its successor replaces it when it is complete, and only if

@@ -121,9 +121,9 @@ impl Mode {
     /// Whether the errors of pixels can be bounded.
     fn can_be_certified(&self) -> bool {
         match self {
-            Self::Projection => true,
+            Self::Projection | Self::Iso { .. } => true,
             Self::Composite { planes, .. } => planes.is_empty(),
-            Self::Iso { .. } | Self::Mip { .. } | Self::Planes { .. } => false,
+            Self::Mip { .. } | Self::Planes { .. } => false,
         }
     }
 
@@ -294,7 +294,7 @@ impl RenderConfig {
             (self.quantity != Quantity::Mean, "quantity"),
         ];
         if self.certify && !self.mode.can_be_certified() {
-            let what = "applies to projections, and to composites without planes";
+            let what = "applies to projections, isosurfaces, and composites without planes";
             return Err(Error::setting("certify", Note::with(what, Remedy::Project)));
         }
         let projects = |setting| Error::setting(setting, Note::with("applies to projections only", Remedy::Project));

@@ -96,7 +96,8 @@ fn renderer<'a>(scene: &dyn Scene, config: &'a RenderConfig) -> Result<Box<dyn R
             Box::new(if config.certify { sliced.certified() } else { sliced.with_planes(planes, transfer) })
         }
         Mode::Iso { surfaces, light, .. } => {
-            Box::new(Sliced::new(grid, config, |view| Isosurfaces::new(surfaces, *light, view))?)
+            let sliced = Sliced::new(grid, config, |view| Isosurfaces::new(surfaces, *light, view))?;
+            Box::new(if config.certify { sliced.certified() } else { sliced })
         }
         Mode::Mip { .. } => Box::new(Sliced::new(grid, config, |_| Largest)?),
         Mode::Planes { planes } => Box::new(Planes::new(grid, config, planes)?),

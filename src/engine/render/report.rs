@@ -20,7 +20,7 @@ pub struct Rendered<'a> {
     /// The picture in the requested quantity.
     pub picture: Picture<'a>,
     /// The error bound of every pixel, in the same unit, if pictures are certified. For projections, the reference is the picture of the
-    /// source's samples, splatted without a cut and without rounding, and NaN is background. For composites it is one number a pixel, which
+    /// source's samples, splatted without a cut and without rounding, and NaN is background. For composites and surfaces it is one number a pixel, which
     /// bounds light and opacity; the reference is the same drawing of the source's samples, without rounding and with no ray ended early.
     pub error: Option<Picture<'a>>,
 }
@@ -33,7 +33,7 @@ pub struct RenderReport {
     /// How each view was splatted.
     pub views: Vec<ViewReport>,
     /// Blocks in the scene, over all windows and channels touched. This and the following counts of blocks and tiles
-    /// include a block or tile again for each frame batch, each group of views and each sweep of a certified composite.
+    /// include a block or tile again for each frame batch, each group of views and each sweep of a certified picture of light.
     pub blocks: u64,
     /// Blocks that were decoded; repeated decoding counts again.
     pub blocks_read: u64,

@@ -3,6 +3,7 @@
 mod given;
 mod options;
 
+use super::results::results_text;
 use crate::{CommonArgs, InputArgs, RemoteArgs, advice, coefficient_name, note_text, spare_inputs};
 use clap::{Arg, Args, Command};
 pub(crate) use options::ConvertArgs;
@@ -37,7 +38,12 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
         args.common.note(format_args!("{}: is complete already", args.output.display()));
         return Ok(());
     };
-    report(done, request.bound, &args.output, &args.common)
+    let text =
+        |r: &ConvertReport| Some(results_text(r.results.as_ref()?, &request.keep.sides, r.promise.units.as_deref()));
+    let results = done.as_ref().ok().and_then(text);
+    report(done, request.bound, &args.output, &args.common)?;
+    results.iter().for_each(|results| args.common.detail(results));
+    Ok(())
 }
 
 /// Reports a finished conversion, or the unfinished file that a failed one left.

@@ -4,8 +4,9 @@ use super::given::GivenOptions;
 use crate::choice::choice;
 use crate::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
 use clap::{Arg, Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_engine::convert::shard::Shard;
 use wavesplat_engine::convert::{BestFor, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
@@ -213,9 +214,15 @@ impl ConvertArgs {
             chain: self.chain as usize,
             shard: self.shard,
             scan: self.scan.clone(),
+            measures: self.is_reported(),
             memory: self.common.memory.0,
             input: self.settings(),
         })
+    }
+
+    /// Whether more than a summary is shown of a file that can be read again.
+    fn is_reported(&self) -> bool {
+        (self.common.json || self.common.verbose) && self.output != Path::new(STANDARD)
     }
 
     fn bound(&self) -> Result<Bound> {

@@ -65,21 +65,52 @@ pub(in crate::render) fn pixel_errors(
     swept: &Swept<Composite>,
     report: &mut RenderReport,
 ) -> Result<Vec<Vec<f32>>> {
-    let certificate = Certificate::new(pass);
-    let SlicePass { number, view, stops, reader, .. } = *pass;
-    let second = SlicePass { number, view, stops, reader, blend: &certificate };
-    let of_frame = |(frame, groups): (usize, &[Cells])| {
-        groups.iter().map(|drawn| Bounded { frame: frame as u32, drawn: *drawn, ..Bounded::START }).collect()
-    };
-    let starts = swept.groups().enumerate().map(of_frame);
-    let bounded = second.sweep_from(starts.collect(), None, report)?;
+    let start = |frame: usize, drawn: &Cells| Bounded { frame: frame as u32, drawn: *drawn, ..Bounded::START };
+    let bounded = second_sweep(pass, swept, &Certificate::new(pass), start, report)?;
     debug_assert!(bounded.groups().flatten().all(|group| group.light == group.drawn), "both sweeps draw the same");
+    errors_of_pixels(bounded, pass, report)
+}
+
+/// Sweeps the slices again. `start` makes the group of a frame from the drawn one.
+pub(super) fn second_sweep<B: Blend, C: Blend>(
+    first: &SlicePass<'_, B>,
+    drawn: &Swept<B>,
+    certificate: &C,
+    start: impl Fn(usize, &B::Group) -> C::Group,
+    report: &mut RenderReport,
+) -> Result<Swept<C>> {
+    let SlicePass { number, view, stops, reader, .. } = *first;
+    let second = SlicePass { number, view, stops, reader, blend: certificate };
+    let starts =
+        drawn.groups().enumerate().map(|(frame, groups)| groups.iter().map(|group| start(frame, group)).collect());
+    second.sweep_from(starts.collect(), None, report)
+}
+
+/// The errors of all frames' pixels after a second sweep.
+pub(super) fn errors_of_pixels<B: Blend, C: Blend>(
+    bounded: Swept<C>,
+    pass: &SlicePass<'_, B>,
+    report: &mut RenderReport,
+) -> Result<Vec<Vec<f32>>> {
     let mut all = Vec::new();
-    bounded.pictures(view, number, report, |_, errors| {
+    bounded.pictures(pass.view, pass.number, report, |_, errors| {
         all.push(errors.to_vec());
         Ok(())
     })?;
     Ok(all)
+}
+
+/// The largest error of a pixel's light and opacity, from those of the cells around it.
+pub(super) fn pixel_of_errors(cells: [&[[f32; 4]; 4]; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
+    let mut sums = [0.0; 4];
+    for (row, down) in cells.into_iter().zip(down) {
+        for (cell, across) in row.iter().zip(across) {
+            (0..4).for_each(|i| sums[i] += (across * down).abs() * cell[i]);
+        }
+    }
+    let largest = sums.into_iter().fold(0.0, f32::max);
+    let error = if largest == 0.0 { 0.0 } else { largest + OF_PIXEL }; // nothing is seen where there is no error
+    out.fill(if error < 1.0 { error } else { 1.0 }); // light and opacity are from 0 to 1
 }
 
 /// Bytes of the second sweep of `frames` frames.
@@ -145,16 +176,8 @@ impl Blend for Certificate<'_> {
         Composite::cells(&group.errors)
     }
 
-    fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], [across, down]: [[f32; 4]; 2], out: &mut [f32]) {
-        let mut sums = [0.0; 4];
-        for (row, down) in cells.into_iter().zip(down) {
-            for (cell, across) in row.iter().zip(across) {
-                (0..4).for_each(|i| sums[i] += (across * down).abs() * cell[i]);
-            }
-        }
-        let largest = sums.into_iter().fold(0.0, f32::max);
-        let error = if largest == 0.0 { 0.0 } else { largest + OF_PIXEL }; // nothing is seen where there is no error
-        out.fill(if error < 1.0 { error } else { 1.0 }); // light and opacity are from 0 to 1
+    fn pixel(_: &Units, cells: [&[[f32; 4]; 4]; 4], weights: [[f32; 4]; 2], out: &mut [f32]) {
+        pixel_of_errors(cells, weights, out);
     }
 
     type Exact = ();
@@ -172,8 +195,8 @@ impl Blend for Certificate<'_> {
 const OF_PIXEL: f32 = 4e-6;
 /// The rounding of a slice: of its opacity and light as a share of these, of the light through it, and of sums of light.
 const OF_OPACITY: f32 = 1.5e-6;
-const OF_THROUGH: f32 = 3e-7;
-const OF_SUM: f32 = 1.5e-7;
+pub(super) const OF_THROUGH: f32 = 3e-7;
+pub(super) const OF_SUM: f32 = 1.5e-7;
 
 /// The light of a group on its gradients, and how far it may be off.
 struct Shaded {

@@ -11,6 +11,7 @@
 
 use super::GROUP;
 use super::filter::Sixteen;
+use super::row::Row;
 use super::view::SlicedView;
 use wavesplat_core::base::vectors::dispatch;
 
@@ -65,10 +66,15 @@ impl Meeting {
         let first = self.covered * of_surface;
         match self.sheets {
             Sheets::One => first,
-            Sheets::Second => first * (1.0 - of_surface) / (1.0 - first).max(f32::MIN_POSITIVE),
+            Sheets::Second => opacity_of_second(first, of_surface),
             Sheets::Both => first * (2.0 - of_surface),
         }
     }
+}
+
+/// The opacity of the second of two sheets, behind the first one.
+pub(super) fn opacity_of_second(first: f32, of_surface: f32) -> f32 {
+    first * (1.0 - of_surface) / (1.0 - first).max(f32::MIN_POSITIVE)
 }
 
 /// Rays of a view, and the box in which surfaces are seen: half a voxel beyond the outermost voxels.
@@ -81,13 +87,13 @@ pub(super) struct Rays {
     /// The width of a cell in voxels.
     pub(super) width: f32,
     /// Voxels of the volume.
-    count: [f32; 3],
+    pub(super) count: [f32; 3],
 }
 
 /// A wider cell would be covered by voxels that were not looked at.
 const WIDEST: f64 = 2.0;
 /// A point this many voxels away from a face is not cut by it.
-const FAR: f32 = 2.0;
+pub(super) const FAR: f32 = 2.0;
 
 impl Rays {
     pub(super) fn new(view: &SlicedView) -> Self {
@@ -103,6 +109,13 @@ impl Rays {
     #[inline(always)]
     pub(super) fn rise(&self, gradient: &[f32; 3]) -> f32 {
         gradient[0] * self.direction[0] + gradient[1] * self.direction[1] + gradient[2]
+    }
+
+    /// The places where the ray of a cell of a row crosses the slice before, and the row's slice.
+    pub(super) fn places(&self, row: &Row<'_>, cell: usize) -> [[f32; 3]; 2] {
+        let [b, c, a] = row.place;
+        let at = [b + cell as f32, c, a];
+        [std::array::from_fn(|axis| at[axis] - self.between * self.direction[axis]), at]
     }
 
     /// Where a ray meets the surface of a value between two points, if it does.
@@ -143,24 +156,33 @@ impl Rays {
 
     /// The share of a cell of a surface within the box. `bend` is the change of the rise along the ray.
     pub(super) fn within(&self, place: &CoverPoint, bend: f32) -> f32 {
-        let distance = |axis: usize| (place.at[axis] + 0.5).min(self.count[axis] - 0.5 - place.at[axis]);
-        let near = |axis: &usize| distance(*axis) < FAR;
-        let shares = (0..3).filter(near).map(|axis| self.of_face(axis, distance(axis), place, bend));
-        shares.fold(1.0, f32::min)
+        let near = |axis: &usize| self.distance(*axis, &place.at) < FAR;
+        let of_face = |axis: usize| self.of_face(axis, self.distance(axis, &place.at), place, bend);
+        (0..3).filter(near).map(of_face).fold(1.0, f32::min)
+    }
+
+    /// The distance of a place from the nearest face of the box across an axis. It is negative beyond the face.
+    pub(super) fn distance(&self, axis: usize, at: &[f32; 3]) -> f32 {
+        (at[axis] + 0.5).min(self.count[axis] - 0.5 - at[axis])
     }
 
     /// The share of a cell on this side of a face across an axis.
     fn of_face(&self, axis: usize, distance: f32, place: &CoverPoint, bend: f32) -> f32 {
         let ([b, c, _], rise) = (place.gradient, self.rise(&place.gradient));
-        // From cell to cell, the point on the surface moves along the ray by -(b, c) / rise.
-        let moved = match axis {
+        // At silhouettes the movement has no limit, but the next cell is beyond the silhouette.
+        let least = (2.0 * bend.abs() * self.width * length([b, c])).sqrt();
+        share(distance * rise.abs().max(least), self.width * self.moved(axis, &place.gradient))
+    }
+
+    /// How far the point of the ray on a surface moves across a face from cell to cell, times the rise. It moves along the ray by
+    /// -(b, c) / rise.
+    pub(super) fn moved(&self, axis: usize, gradient: &[f32; 3]) -> f32 {
+        let ([b, c, _], rise) = (*gradient, self.rise(gradient));
+        length(match axis {
             0 => [rise - self.direction[0] * b, -self.direction[0] * c],
             1 => [-self.direction[1] * b, rise - self.direction[1] * c],
             _ => [b, c],
-        };
-        // At silhouettes this has no limit, but the next cell is beyond the silhouette.
-        let least = (2.0 * bend.abs() * self.width * length([b, c])).sqrt();
-        share(distance * rise.abs().max(least), self.width * length(moved))
+        })
     }
 }
 
@@ -206,7 +228,7 @@ fn near(from: &Slope, to: &Slope, values: &[f32], rays: &Rays) -> u32 {
 }
 
 /// Half, and a number of widths more; from 0 to 1.
-fn share(number: f32, width: f32) -> f32 {
+pub(super) fn share(number: f32, width: f32) -> f32 {
     let share = 0.5 + number / width.max(f32::MIN_POSITIVE);
     if share.is_nan() { 1.0 } else { share.clamp(0.0, 1.0) }
 }
@@ -216,14 +238,14 @@ fn length([b, c]: [f32; 2]) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Numbers between -1 and 1.
-    struct Random(u32);
+    pub(in super::super) struct Random(pub(in super::super) u32);
 
     impl Random {
-        fn next(&mut self) -> f32 {
+        pub(in super::super) fn next(&mut self) -> f32 {
             self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (self.0 >> 8) as f32 / 8_388_608.0 - 1.0
         }

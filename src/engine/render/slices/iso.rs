@@ -15,22 +15,24 @@ use wavesplat_core::base::vectors::dispatch;
 /// Surfaces of several values.
 pub(in crate::render) struct Isosurfaces {
     /// In the order of their values.
-    surfaces: Vec<Surface>,
+    pub(super) surfaces: Vec<Surface>,
     /// Their values in units.
-    values: Vec<f32>,
-    shader: Shader,
-    rays: Rays,
-    units: Units,
+    pub(super) values: Vec<f32>,
+    pub(super) shader: Shader,
+    pub(super) rays: Rays,
+    pub(super) units: Units,
+    /// How far beyond the values of samples surfaces are looked for, in units: 0 unless errors are bounded.
+    pub(super) beyond: f32,
 }
 
 /// Sixteen cells.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct Front {
     /// Red, green and blue of the light, and the transmittance.
-    light: [[f32; 4]; GROUP],
+    pub(super) light: [[f32; 4]; GROUP],
     last: Slope,
     /// The number of the last slice.
-    slice: u32,
+    pub(super) slice: u32,
 }
 
 impl Isosurfaces {
@@ -42,11 +44,11 @@ impl Isosurfaces {
         let zero = surfaces[0].value;
         let units = Units { zero, per: if most > 0.0 { 1.0 / most } else { 1.0 } };
         let values = surfaces.iter().map(|surface| units.number(surface.value)).collect();
-        Self { surfaces, values, shader, rays: Rays::new(view), units }
+        Self { surfaces, values, shader, rays: Rays::new(view), units, beyond: 0.0 }
     }
 
     /// Adds the surfaces between two points of a ray behind those in front of them.
-    fn pass(&self, light: &mut [f32; 4], from: &CoverPoint, to: &CoverPoint) {
+    pub(super) fn pass(&self, light: &mut [f32; 4], from: &CoverPoint, to: &CoverPoint) {
         if from.value.is_nan() || to.value.is_nan() {
             return;
         }
@@ -89,7 +91,8 @@ impl Blend for Isosurfaces {
     }
 
     fn shows(&self, range: (f32, f32)) -> bool {
-        self.values.iter().any(|value| range.0 <= *value && *value <= range.1)
+        let (least, largest) = (range.0 - self.beyond, range.1 + self.beyond);
+        self.values.iter().any(|value| least <= *value && *value <= largest)
     }
 
     fn add(&self, row: &Row<'_>, RowGroups { states, limits, live, .. }: RowGroups<'_, Front>) {
@@ -99,9 +102,7 @@ impl Blend for Isosurfaces {
             let marks = if follows { self.rays.near(&self.values, &group.last, &next) } else { 0 };
             if marks != 0 {
                 for i in (0..GROUP).filter(|i| marks >> i & 1 == 1) {
-                    let [b, c, a] = row.place;
-                    let at = [b + (n * GROUP + i) as f32, c, a];
-                    let before = std::array::from_fn(|axis| at[axis] - self.rays.between * self.rays.direction[axis]);
+                    let [before, at] = self.rays.places(row, n * GROUP + i);
                     self.pass(&mut group.light[i], &group.last.point(i, before), &next.point(i, at));
                 }
                 *limit = group.light.iter().map(|cell| cell[3]).fold(0.0, f32::max);
@@ -141,7 +142,7 @@ impl Blend for Isosurfaces {
 
 /// The field at a group of cells.
 #[inline(always)]
-fn slope(row: &Row<'_>, group: usize) -> Slope {
+pub(super) fn slope(row: &Row<'_>, group: usize) -> Slope {
     if row.is_whole(group) {
         return Slope { values: row.sums(group), gradient: row.gradient(group, None) };
     }

@@ -38,7 +38,8 @@
 //! With sharp opacities, slabs of at most a voxel have several slices. Where the values of a group of cells hardly change
 //! from slab to slab, one slice of the slab's thickness takes their place.
 //!
-//! A certified composite is swept twice: first it is drawn, then the errors of its pixels are bounded ([`certificate`], eq 49).
+//! Certified composites and isosurfaces are swept twice: first they are drawn, then the errors of their pixels are bounded
+//! ([`certificate`], eq 49; [`iso_certificate`], eq 50).
 //!
 //! Bricks and blocks are skipped if no value between their least and largest is visible, and cells that are opaque.
 //! Each cell is computed in the same way whatever the number of threads, bands, frames and blocks in memory.
@@ -54,6 +55,7 @@ mod row;
 mod shade;
 mod blend;
 mod cover;
+mod cover_bounds;
 mod iso;
 mod mip;
 mod steepest;
@@ -64,6 +66,7 @@ mod needed;
 mod batch;
 mod field_errors;
 mod certificate;
+mod iso_certificate;
 mod renderer;
 
 #[cfg(test)]

@@ -3,6 +3,8 @@
 use super::batch::{SlicePass, Swept, bytes};
 use super::blend::Composite;
 use super::certificate::{certificate_bytes, pixel_errors};
+use super::iso::Isosurfaces;
+use super::iso_certificate::{iso_bytes, iso_errors, seen_with_errors};
 use super::row::Blend;
 use super::stops::Stops;
 use super::view::SlicedView;
@@ -30,19 +32,28 @@ type FrameErrors = Vec<Vec<f32>>;
 
 /// What bounds the errors of pixels.
 struct Certifier<B: Blend> {
+    /// The blend of a batch, made from that of a view.
+    blend: fn(B, &SlicedView, &SampleReader<'_>) -> B,
     /// The bounds of each frame of a batch after its slices.
     errors: fn(&SlicePass<'_, B>, &Swept<B>, &mut RenderReport) -> Result<FrameErrors>,
     /// Bytes that this takes for a number of frames, without decoded blocks. The last argument is whether light falls on the field.
     bytes: fn(&SlicedView, usize, BlockGrid, bool) -> usize,
 }
 
-impl<'a> Sliced<'a, Composite> {
+impl Sliced<'_, Composite> {
     /// The same with bounds of the errors of all pixels. Every slice is drawn, no slab in place of several, and every ray by its length.
     pub(in crate::render) fn certified(self) -> Self {
         let views = self.views.iter().map(SlicedView::slice_by_slice).collect();
-        let blend = self.blend;
-        let certifier = Some(Certifier { errors: pixel_errors, bytes: certificate_bytes });
-        Self { views, blend: Box::new(move |view| blend(view).by_lengths()), certifier, planes: None }
+        let blend = |composite: Composite, _: &SlicedView, _: &SampleReader<'_>| composite.by_lengths();
+        let certifier = Some(Certifier { blend, errors: pixel_errors, bytes: certificate_bytes });
+        Self { views, certifier, ..self }
+    }
+}
+
+impl Sliced<'_, Isosurfaces> {
+    /// The same with bounds of the errors of all pixels.
+    pub(in crate::render) fn certified(self) -> Self {
+        Self { certifier: Some(Certifier { blend: seen_with_errors, errors: iso_errors, bytes: iso_bytes }), ..self }
     }
 }
 
@@ -96,8 +107,11 @@ impl<'a, B: Blend> Sliced<'a, B> {
         report.views[number].table_error = blend.table_error();
         let behind = self.planes.map(|planes| Behind::new(scene.grid(), config, number, view, planes)).transpose()?;
         let render = |reader: &SampleReader<'_>, report: &mut RenderReport| {
+            let of_batch = |certifier: &Certifier<B>| (certifier.blend)((self.blend)(view), view, reader);
+            let certified = self.certifier.as_ref().map(of_batch);
+            let blend = certified.as_ref().unwrap_or(&blend);
             let stops = behind.as_ref().map(|behind| &behind.stops);
-            let pass = SlicePass { number, view, blend: &blend, stops, reader };
+            let pass = SlicePass { number, view, blend, stops, reader };
             let swept = pass.sweep(report)?;
             let errors = self.certifier.as_ref().map(|certifier| (certifier.errors)(&pass, &swept, report));
             let planes = behind.as_ref().map(|behind| PlanesPass { view: &behind.planes, reader }.pictures(report));

@@ -88,6 +88,18 @@ impl Shader {
         [colour, of_gloss].map(|off| off + OF_LIGHT * self.brightest())
     }
 
+    /// The least and the largest share of the colour, each with the gloss, of points from a share of the way between two gradients per voxel to
+    /// another. The gradients may be off by vectors of the length `off` per world unit.
+    pub(super) fn between(&self, [from, to]: [[f32; 3]; 2], shares: [f32; 2], off: f32) -> [[f32; 2]; 2] {
+        let most = from.iter().chain(&to).fold(f32::MIN_POSITIVE, |most, n| most.max(n.abs()));
+        let [middle, half] = [0.5 * (shares[0] + shares[1]), 0.5 * (shares[1] - shares[0])];
+        let way: [f32; 3] = std::array::from_fn(|i| to[i] / most - from[i] / most);
+        let at = std::array::from_fn(|i| from[i] / most + middle * way[i]);
+        let way = [way[0] * self.per[0], way[1] * self.per[1], way[2] * self.per[2]];
+        let (lit, doubt) = (self.shade_cell(at), self.doubt(at, off / most + half * dot(way, way).sqrt()));
+        [-1.0, 1.0].map(|sign| std::array::from_fn(|i| (lit[i] + sign * doubt[i]).max(0.0)))
+    }
+
     /// The most light that a colour gives.
     pub(super) fn brightest(&self) -> f32 {
         let Light { ambient, diffuse, specular, .. } = self.light;

@@ -1,4 +1,5 @@
-//! Certified composites (eq 49): no pixel is further from the same drawing of any original than its certificate says.
+//! Certified composites and isosurfaces (eq 49, 50): no pixel is further from the same drawing of any original than its certificate
+//! says.
 //!
 //! An original is any archive within the errors that the file states. The tests draw many, also such that are chosen to move a
 //! pixel as far as they can. A drawing of the original's samples states its own rounding; nothing else is allowed.
@@ -12,7 +13,7 @@ use wavesplat::base::grid::{Grid, Region};
 use wavesplat::base::sample::SampleType;
 use wavesplat::colour::TransferFunction;
 use wavesplat::convert::{Basis, Bound, ConvertConfig};
-use wavesplat::render::{CoefficientScene, Light, Mode, Plane, Quantity, RenderConfig, SplatSource, render};
+use wavesplat::render::{CoefficientScene, Light, Mode, Plane, Quantity, RenderConfig, SplatSource, Surface, render};
 use wavesplat::view::camera::View;
 
 const TYPE: SampleType = SampleType::F64;
@@ -127,40 +128,65 @@ fn sources(grid: Grid, frames: usize) -> Vec<Memory> {
 
 const VIEWS: [(f64, f64); 4] = [(30.0, 20.0), (200.0, -35.0), (0.0, 0.0), (75.0, 80.0)];
 
+/// Surfaces of one value, glass, two values in opposite orders, and close ones.
+fn surfaces((least, largest): (f64, f64)) -> [Mode; 5] {
+    let surface = |share: f64, opacity: f64| {
+        let colour = [0.2 + 0.6 * share, 1.0 - share, 0.9 * share];
+        Surface { value: least + share * (largest - least), colour, opacity }
+    };
+    let of = |surfaces: &[Surface]| Mode::Iso { surfaces: surfaces.to_vec(), slices: None, light: Light::default() };
+    [
+        of(&[surface(0.55, 1.0)]),
+        of(&[surface(0.5, 0.4)]),
+        of(&[surface(0.4, 0.5), surface(0.7, 1.0)]),
+        of(&[surface(0.6, 0.7), surface(0.3, 0.3)]),
+        of(&[surface(0.5, 0.6), surface(0.51, 0.6), surface(0.53, 1.0)]),
+    ]
+}
+
+/// All modes that are certified beside projections.
+fn modes(range: (f64, f64)) -> Vec<Mode> {
+    let lights = [None, Some(Light::default())];
+    let composites = opacities().into_iter().flat_map(|points| lights.map(|light| mode(&points, range, light)));
+    composites.chain(surfaces(range)).collect()
+}
+
 #[test]
 fn no_original_is_beyond_the_certificate() {
     let (grid, frames) = (SKEWED, 2);
-    let (mut random, mut used, mut case) = (Random(5), 0.0_f32, 0);
+    let (mut random, mut used, mut case) = (Random(5), [0.0_f32; 2], 0);
     for source in sources(grid, frames) {
         for tolerance in [0.05, 1e-3, 1e-7] {
             let config = ConvertConfig { block: Some(4), ..settings(Basis::Haar, 4, tolerance) };
             let decoded = Decoded::new(grid, &source, &config);
-            for points in opacities() {
-                for light in [None, Some(Light::default())] {
-                    case += 1;
-                    if !is_taken(case, 5) {
-                        continue;
-                    }
-                    let (azimuth, elevation) = VIEWS[case % VIEWS.len()];
-                    let mode = mode(&points, range(&decoded.samples), light);
-                    let config = certified(view(azimuth, elevation, [18, 15]), &grid, frames, mode);
-                    let found = Certified::of_file(&decoded.file, &config);
-                    let mut check = |original: &Memory, name: &str| {
-                        let share = found.check(&Certified::of_original(original, &config), &format!("{name} {case}"));
-                        used = used.max(share);
-                    };
-                    check(&source, "the source");
-                    check(&decoded.original(grid, |_| 0.0), "what is decoded");
-                    for sign in [-1.0, 1.0] {
-                        check(&decoded.original(grid, |_| sign), "all off alike");
-                    }
-                    check(&decoded.original(grid, |_| random.signed()), "random");
-                    check(&decoded.original(grid, |_| random.signed() * 1e9), "random signs");
+            for mode in modes(range(&decoded.samples)) {
+                case += 1;
+                if !is_taken(case, 5) {
+                    continue;
                 }
+                let (azimuth, elevation) = VIEWS[case % VIEWS.len()];
+                let config = certified(view(azimuth, elevation, [18, 15]), &grid, frames, mode);
+                let found = Certified::of_file(&decoded.file, &config);
+                let mut check = |original: &Memory, name: &str| {
+                    let share = found.check(&Certified::of_original(original, &config), &format!("{name} {case}"));
+                    used[kind(&config)] = used[kind(&config)].max(share);
+                };
+                check(&source, "the source");
+                check(&decoded.original(grid, |_| 0.0), "what is decoded");
+                for sign in [-1.0, 1.0] {
+                    check(&decoded.original(grid, |_| sign), "all off alike");
+                }
+                check(&decoded.original(grid, |_| random.signed()), "random");
+                check(&decoded.original(grid, |_| random.signed() * 1e9), "random signs");
             }
         }
     }
-    assert!(used > 0.5, "only {used} is used");
+    assert!(used.iter().all(|used| *used > 0.5), "only {used:?} are used");
+}
+
+/// 0 of composites, 1 of surfaces.
+fn kind(config: &RenderConfig) -> usize {
+    usize::from(matches!(config.mode, Mode::Iso { .. }))
 }
 
 /// Looks for the original that moves a pixel farthest: layer by layer, samples are off to the side that moves it more.
@@ -170,23 +196,16 @@ fn no_climbing_adversary_is_beyond_the_certificate() {
     let source = archive(grid, TYPE, &field(&grid, frames, 8));
     let config = ConvertConfig { block: Some(4), ..settings(Basis::Haar, 4, 0.03) };
     let decoded = Decoded::new(grid, &source, &config);
-    let mut used = 0.0_f32;
-    for (n, points) in opacities().into_iter().enumerate() {
-        for light in [None, Some(Light::default())] {
-            let (azimuth, elevation) = VIEWS[n];
-            let config = certified(
-                view(azimuth, elevation, [16, 12]),
-                &grid,
-                frames,
-                mode(&points, range(&decoded.samples), light),
-            );
-            let found = Certified::of_file(&decoded.file, &config);
-            for pixel in [70, 103] {
-                used = used.max(climb(&decoded, &found, &config, pixel));
-            }
+    let mut used = [0.0_f32; 2];
+    for (n, mode) in modes(range(&decoded.samples)).into_iter().enumerate() {
+        let (azimuth, elevation) = VIEWS[n / 2 % VIEWS.len()];
+        let config = certified(view(azimuth, elevation, [16, 12]), &grid, frames, mode);
+        let found = Certified::of_file(&decoded.file, &config);
+        for pixel in [70, 103] {
+            used[kind(&config)] = used[kind(&config)].max(climb(&decoded, &found, &config, pixel));
         }
     }
-    assert!(used > 0.6, "only {used} is used");
+    assert!(used.iter().all(|used| *used > 0.6), "only {used:?} are used");
 }
 
 /// The largest share of a certificate that a climb for one pixel uses.
@@ -247,10 +266,35 @@ fn memory_changes_no_bit_of_a_certificate() {
     let grid = Grid::unit([20, 18, 16]);
     let source = archive(grid, TYPE, &field(&grid, 12, 3));
     let file = stored(&mut source.clone(), &ConvertConfig { block: Some(4), ..settings(Basis::Haar, 8, 0.01) });
-    let mode = mode(&opacities()[1], range(&values(&source, TYPE)), Some(Light::default()));
-    let config = certified(view(30.0, 25.0, [60, 50]), &grid, 12, mode);
-    assert!(under_less_memory(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &config) >= 3);
-    assert!(under_less_memory(&mut direct(&source, None), &config) >= 3);
+    let range = range(&values(&source, TYPE));
+    let [surfaces, ..] = surfaces(range);
+    for mode in [mode(&opacities()[1], range, Some(Light::default())), surfaces] {
+        let config = certified(view(30.0, 25.0, [60, 50]), &grid, 12, mode);
+        assert!(under_less_memory(&mut CoefficientScene::new(file.open(), SplatSource::Coefficients), &config) >= 3);
+        assert!(under_less_memory(&mut direct(&source, None), &config) >= 3);
+    }
+}
+
+/// A ball, whose surface faces the viewer in most pixels: it is the more certain, the smaller the errors of samples are.
+#[test]
+fn surfaces_are_certain_where_errors_are_small() {
+    let grid = Grid { dims: [22, 20, 24], spacing: [1.0, 1.1, 0.9], origin: [0.0; 3] };
+    let distance = |voxel: [usize; 3]| -> f64 {
+        (0..3).map(|i| ((voxel[i] as f64 - 10.5) * grid.spacing[i]).powi(2)).sum::<f64>().sqrt()
+    };
+    let samples = Vec::from_iter(grid.whole().iter().map(|voxel| 10.0 - distance(voxel)));
+    let source = archive(grid, TYPE, &samples);
+    let share = |tolerance: f64, mode: &Mode| {
+        let file = stored(&mut source.clone(), &settings(Basis::Haar, 1, tolerance));
+        let found = Certified::of_file(&file, &certified(view(25.0, 15.0, [60, 50]), &grid, 1, mode.clone()));
+        let seen = Vec::from_iter(found.errors.iter().zip(found.light.chunks_exact(4)).filter(|(_, l)| l[3] > 0.0));
+        let certain = seen.iter().filter(|(error, _)| **error < 0.05).count();
+        certain as f64 / seen.len() as f64
+    };
+    for mode in &surfaces(range(&samples))[..2] {
+        let shares = [1e-2, 1e-3, 1e-4, 1e-7].map(|tolerance| share(tolerance, mode));
+        assert!(shares.is_sorted() && shares[2] > 0.8 && shares[3] > 0.9, "{shares:?}");
+    }
 }
 
 /// One block of a long volume is far off, and the others are exact: the certificate knows where, from every side.
