@@ -69,6 +69,8 @@ fn reports_tell_what_becomes_of_results() {
     told("convert a.npy -o c.wspl -v", true);
     told("convert a.npy -o d.wspl", false);
     told("convert a.npy -o e.wspl -v --transfer-function turbo", false);
+    let verified = work.piped("verify a.wspl --against - --json", &archive.npy()).ok().json();
+    assert!(verified["results"].is_null() && verified["against"]["samples"] == source.len());
     let piped = work.piped("convert - -o f.wspl --json", &archive.npy()).ok().json();
     assert!(piped["results"].is_null() && piped["frames"] == 8);
 }

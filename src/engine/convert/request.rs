@@ -62,7 +62,7 @@ pub struct ConvertRequest {
     pub shard: Option<Shard>,
     /// The file of an [`ArchiveScan`]: it gives `range`. Default: none.
     pub scan: Option<PathBuf>,
-    /// Whether the report tells the errors of what is computed from the samples. It takes reading some blocks again. Default: no.
+    /// Whether the report tells the errors of what is computed from the samples. It takes reading up to three windows again. Default: no.
     pub measures: bool,
     /// Bytes that may be allocated. Default: 512 MiB.
     pub memory: usize,

@@ -3,6 +3,7 @@
 use super::estimate::{EstimatedErrors, some_blocks};
 use crate::file::CoefficientFile;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::memory::FIXED;
 use wavesplat_core::codec::derived::{Computed, DerivedErrors};
 use wavesplat_core::source::{FrameSource, FrameWindow, read_frames};
 
@@ -14,13 +15,14 @@ const BLOCKS: usize = 8;
 /// keeps. `None` of colours, and if `memory` bytes have no room for a block beside its source.
 ///
 /// # Errors
-/// The file or the source cannot be read, or the source has other frames than were converted.
+/// The file or the source cannot be read, or the source is a stream, or has other frames than were converted.
 pub fn errors_of_results(
     file: &CoefficientFile,
     source: &mut dyn FrameSource,
     memory: usize,
 ) -> Result<Option<EstimatedErrors>> {
-    let needed = bytes_of_block(file) + source.archive().memory;
+    file.limit_shared(memory);
+    let needed = FIXED + file.shared_bytes(memory) + source.archive().memory + bytes_of_block(file);
     if file.colour_transform().is_some() || needed > memory || file.frames() == 0 {
         return Ok(None);
     }

@@ -51,7 +51,7 @@ pub fn run(
     let resume_from = complete.map(|complete| ResumePoint { complete, first_window: 0, description: None });
     let target = Target { name: output, out, resume_from };
     let report = finish(source.as_mut(), &config, target, progress, || Ok(()))?;
-    // A stream cannot be read again.
+    // What cannot be measured, such as a stream, is converted all the same.
     let mut errors = || errors_of_results(&CoefficientFile::open(output)?, source.as_mut(), request.memory);
     let results = if request.measures { errors().unwrap_or_default() } else { None };
     Ok(Some(ConvertReport { results, ..report }))

@@ -58,7 +58,7 @@ pub struct Surface {
 }
 
 /// The largest number of surfaces.
-const MOST_SURFACES: usize = 64;
+pub(super) const MOST_SURFACES: usize = 64;
 
 /// An error unless these surfaces can be drawn.
 pub(super) fn check_surfaces(surfaces: &[Surface]) -> Result<()> {

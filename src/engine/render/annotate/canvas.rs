@@ -12,13 +12,15 @@ pub(super) struct Canvas<'a> {
     pub(super) letters: Letters,
     /// The rectangles of all texts, and of the colour bar. Nothing else is drawn there.
     pub(super) taken: Vec<Rectangle>,
+    /// All texts.
+    pub(super) written: Vec<String>,
 }
 
 impl<'a> Canvas<'a> {
     /// A picture without texts, with letters of the size that suits it.
     pub(super) fn new(pixels: &'a mut [Rgb], size: [usize; 2], background: Rgb) -> Self {
         let (ink, letters) = (contrast(background), Letters::new(layout::line(size)));
-        Self { pixels, width: size[0], ink, letters, taken: Vec::new() }
+        Self { pixels, width: size[0], ink, letters, taken: Vec::new(), written: Vec::new() }
     }
 }
 
@@ -67,7 +69,7 @@ impl Canvas<'_> {
     }
 
     /// Whether a rectangle is in the picture and free.
-    fn is_free(&self, rectangle: &Rectangle) -> bool {
+    pub(super) fn is_free(&self, rectangle: &Rectangle) -> bool {
         let size = self.size();
         (0..2).all(|i| rectangle[0][i] >= 0.0 && rectangle[1][i] <= size[i])
             && !self.taken.iter().any(|taken| overlap(taken, rectangle))
@@ -86,22 +88,34 @@ impl Canvas<'_> {
 
     /// The same in letters of another size.
     pub(super) fn write_in(&mut self, letters: &Letters, text: &str, middle: [f64; 2]) -> bool {
-        let half = [letters.width(text) / 2.0, letters.size / 2.0];
-        let corners = [-1.0, 1.0].map(|side| std::array::from_fn(|i| middle[i] + side * half[i]));
-        let fits = !text.is_empty() && self.is_free(&corners);
+        let ink = self.ink;
+        let fits = self.take(text, middle, [letters.width(text) / 2.0, letters.size / 2.0]);
         if fits {
-            let ink = self.ink;
             letters.draw(text, middle, |x, y, share| self.put(x, y, ink, share));
-            self.taken.push(corners);
         }
         fits
     }
 
-    /// Writes a text upwards around a point.
-    pub(super) fn write_upwards(&mut self, text: &str, middle: [f64; 2]) {
+    /// [`Self::write`], upwards.
+    pub(super) fn write_upwards(&mut self, text: &str, middle: [f64; 2]) -> bool {
         let (letters, ink) = (self.letters.clone(), self.ink);
-        let [x0, y0] = middle.map(f64::round);
-        letters.draw(text, [0.0, 0.0], |x, y, share| self.put(x0 as i64 + y, y0 as i64 - x, ink, share));
+        let fits = self.take(text, middle, [letters.size / 2.0, letters.width(text) / 2.0]);
+        if fits {
+            let [x0, y0] = middle.map(f64::round);
+            letters.draw(text, [0.0, 0.0], |x, y, share| self.put(x0 as i64 + y, y0 as i64 - x, ink, share));
+        }
+        fits
+    }
+
+    /// Takes the place of a text, if it is in the picture and free.
+    fn take(&mut self, text: &str, middle: [f64; 2], half: [f64; 2]) -> bool {
+        let corners = [-1.0, 1.0].map(|side| std::array::from_fn(|i| middle[i] + side * half[i]));
+        let fits = !text.is_empty() && self.is_free(&corners);
+        if fits {
+            self.taken.push(corners);
+            self.written.push(text.into());
+        }
+        fits
     }
 }
 

@@ -87,8 +87,8 @@ const LINE: f64 = 0.03;
 pub(super) const LEAST_LINE: f64 = 10.0;
 
 /// Lines that a part takes: the colour bar with values and name, the values and the name of an axis, and the time.
-pub(super) const BAR: f64 = 7.0;
-const AXIS: [f64; 2] = [4.0, 3.0];
+pub(super) const BAR: f64 = 7.6;
+const AXIS: [f64; 2] = [5.2, 3.2];
 const TIME: f64 = 2.0;
 
 /// A picture has values along axes if its shorter side has this many lines.

@@ -198,19 +198,29 @@ impl Annotation {
             canvas.fill([x, y + row], [w, 1], scale.colour_at(1.0 - row as f64 / (h - 1).max(1) as f64));
         }
         let values = ticks::ticks(scale, ((length / (2.0 * size)) as usize).clamp(2, 8));
-        for (text, value) in ticks::texts(&values).into_iter().zip(values) {
+        let room = (BAR - name - 2.3) * size;
+        for (text, value) in bar_texts(&canvas.letters, &values, room).into_iter().zip(values) {
             let at = top + (1.0 - scale.share(value)) * (length - 1.0) + 0.5;
-            canvas.line([left - rim - 0.4 * size, at], [left - rim, at], rim);
             let half = canvas.letters.width(&text) / 2.0;
-            if 2.0 * half <= (BAR - name - 1.7) * size + 1.0 {
-                canvas.write(&text, [left - 0.8 * size - half, at]);
+            if 2.0 * half <= room && canvas.write(&text, [left - 0.8 * size - half, at]) {
+                canvas.line([left - rim - 0.4 * size, at], [left - rim, at], rim);
             }
         }
         let name = shortened(&self.values, |text| canvas.letters.width(text) <= 0.9 * height);
-        canvas.write_upwards(&name, [width - 0.9 * size, top + length / 2.0]);
+        let half = canvas.letters.width(&name) / 2.0;
+        let middle = (top + length / 2.0).clamp(half, (height - half).max(half));
+        canvas.write_upwards(&name, [width - 0.9 * size, middle]);
         canvas.taken.truncate(texts);
         canvas.taken.push([[width - BAR * size, top - size], [width, top + length + size]]);
     }
+}
+
+/// The texts of a bar's values, in the form that has room.
+fn bar_texts(letters: &Letters, values: &[f64], room: f64) -> Vec<String> {
+    let texts = ticks::texts(values);
+    let with_power: Vec<String> = values.iter().map(|value| ticks::with_power(*value)).collect();
+    let width = |texts: &[String]| texts.iter().map(|text| letters.width(text)).fold(0.0, f64::max);
+    if width(&texts) > room && width(&with_power) < width(&texts) { with_power } else { texts }
 }
 
 /// From where a view is seen, in letters.
@@ -258,7 +268,7 @@ mod tests {
 
     fn annotation() -> Annotation {
         let grid = Grid::unit([20, 10, 15]);
-        let axes = VolumeAxes { grid, region: grid.whole(), rim: 0.0, labels: Default::default() };
+        let axes = VolumeAxes { grid, region: grid.whole(), rim: 0.0, exaggeration: 1.0, labels: Default::default() };
         let (title, values) = ("a run".into(), "speed (m s⁻¹)".into());
         Annotation { parts: Parts::ALL, title, values, axes: Some(axes), ..Annotation::default() }
     }

@@ -42,12 +42,34 @@ pub(super) fn all_round_values(lo: f64, hi: f64, most: usize) -> impl Iterator<I
     steps.filter(move |_| width > 0.0 && width.is_finite()).filter_map(values)
 }
 
+/// Round values between two numbers from the roundest on: 0, powers of ten, their fives and twos, and then the multiples between.
+/// For axes whose values lie unevenly: no step suits them.
+pub(super) fn roundest(lo: f64, hi: f64) -> Vec<f64> {
+    /// So many powers of ten below the largest.
+    const POWERS: i32 = 6;
+    let largest = lo.abs().max(hi.abs());
+    let (last, within) = (exponent(largest), |v: &f64| (lo..=hi).contains(v));
+    let of = |multiples: &[f64]| -> Vec<f64> {
+        let powers = (last - POWERS..=last).rev();
+        powers
+            .flat_map(|power| multiples.iter().flat_map(move |m| [1.0, -1.0].map(|sign| sign * m * ten_to(power))))
+            .collect()
+    };
+    let all = [vec![0.0], of(&[1.0]), of(&[5.0]), of(&[2.0]), of(&[3.0, 7.0, 4.0, 8.0, 6.0, 9.0]), of(&[1.5, 2.5])];
+    all.concat().into_iter().filter(within).collect()
+}
+
 /// The texts of values, all with a power of ten or all without.
 pub(super) fn texts(values: &[f64]) -> Vec<String> {
     let short: Vec<String> = values.iter().map(|value| decimal::short(*value)).collect();
     let with_power = short.iter().any(|text| text.contains('e'));
-    let texts = if with_power { values.iter().map(|value| decimal::with_power(*value)).collect() } else { short };
-    texts.into_iter().map(|text| text.replace('-', "−")).collect()
+    let texts = short.into_iter().map(|text| text.replace('-', "−"));
+    if with_power { values.iter().map(|value| self::with_power(*value)).collect() } else { texts.collect() }
+}
+
+/// A value as a number and a power of ten.
+pub(super) fn with_power(value: f64) -> String {
+    decimal::with_power(value).replace('-', "−")
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that a positive number reaches.
@@ -128,6 +150,14 @@ mod tests {
             }
         }
         assert_eq!(all_round_values(3.0, 3.0, 6).count() + all_round_values(0.0, f64::INFINITY, 6).count(), 0);
+    }
+
+    #[test]
+    fn the_roundest_values_come_first() {
+        assert_eq!(roundest(0.0, 3000.0)[..6], [0.0, 1000.0, 100.0, 10.0, 1.0, 0.1]);
+        assert_eq!(roundest(-60.0, -3.0)[..4], [-10.0, -50.0, -5.0, -20.0]);
+        assert_eq!(roundest(310.0, 790.0), [500.0, 700.0, 400.0, 600.0]);
+        assert_eq!(roundest(0.0, 0.0), [0.0]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::canvas::{Canvas, line};
 use super::layout::BAR;
 use super::text::Letters;
-use super::ticks::{all_round_values, round_below, texts};
+use super::ticks::{all_round_values, round_below, roundest, texts};
 use wavesplat_core::base::decimal;
 use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::view::camera::Camera;
@@ -28,6 +28,8 @@ pub struct VolumeAxes {
     pub region: Region,
     /// How far the picture reaches beyond the box, in world units.
     pub rim: f64,
+    /// The factor by which heights are drawn taller than they are.
+    pub exaggeration: f64,
     /// The axes x, y and z, with a coordinate for each voxel of the grid.
     pub labels: [AxisLabels; 3],
 }
@@ -37,6 +39,9 @@ pub(super) const THIN: f64 = 0.08;
 
 /// By how much lengths may differ that count as the same.
 const EVEN: f64 = 1e-3;
+
+/// The largest step of an axis that counts as even, as a multiple of the least one.
+const UNEVEN: f64 = 1.2;
 
 /// An edge of the box in a picture.
 #[derive(Debug, Clone, Copy)]
@@ -50,6 +55,8 @@ struct Edge {
 
 /// The most values along an edge. So many are taken only if a coarser step gives fewer than four.
 const MOST_TICKS: usize = 7;
+/// The same of uneven axes, where single values say less.
+const MOST_UNEVEN: usize = 10;
 
 /// A value beside an edge.
 #[derive(Debug, Clone)]
@@ -148,18 +155,51 @@ impl VolumeAxes {
         let mut widest: f64 = 0.0;
         for Tick { text, share, middle, half } in self.ticks(edge, &canvas.letters, rim) {
             let at = point(edge.from, edge.to, share);
-            canvas.line(at, moved(at, edge.out, rim + 0.4 * size), (THIN * size).max(1.0));
-            canvas.write(&text, middle);
-            widest = widest.max(2.0 * reach(edge.out, half));
+            if canvas.write(&text, middle) {
+                canvas.line(at, moved(at, edge.out, rim + 0.4 * size), (THIN * size).max(1.0));
+                widest = widest.max(2.0 * reach(edge.out, half));
+            }
         }
-        let name = self.labels[edge.axis].title();
-        let half = reach(edge.out, [canvas.letters.width(&name) / 2.0, size / 2.0]);
-        canvas.write(&name, moved(point(edge.from, edge.to, 0.5), edge.out, rim + 0.9 * size + widest + half));
+        self.draw_name(canvas, edge, rim + 0.9 * size + widest);
+    }
+
+    /// Writes the name of an axis `away` from its edge: upwards beside steep edges, unless it is short. Where it has no room in the
+    /// middle, it stands nearer to an end; a long one is shortened.
+    fn draw_name(&self, canvas: &mut Canvas<'_>, edge: &Edge, away: f64) {
+        const SHARES: [f64; 7] = [0.5, 0.4, 0.6, 0.3, 0.7, 0.15, 0.85];
+        let (size, letters) = (canvas.letters.size, canvas.letters.clone());
+        let is_steep = (edge.to[1] - edge.from[1]).abs() > (edge.to[0] - edge.from[0]).abs();
+        let mut put = |name: &str| {
+            let half = [letters.width(name) / 2.0, size / 2.0];
+            let upwards = is_steep && half[0] > 1.3 * size;
+            let turned = if upwards { [half[1], half[0]] } else { half };
+            SHARES.into_iter().any(|share| {
+                let at = moved(point(edge.from, edge.to, share), edge.out, away + reach(edge.out, turned));
+                if upwards { canvas.write_upwards(name, at) } else { canvas.write(name, at) }
+            })
+        };
+        let labels = &self.labels[edge.axis];
+        let names = [labels.title() + &self.note(edge.axis), labels.title(), labels.name.clone()];
+        let beginnings = (1..labels.name.chars().count()).rev();
+        let shorter = beginnings.map(|count| labels.name.chars().take(count).chain(['…']).collect::<String>());
+        let _ = names.into_iter().chain(shorter).any(|name| put(&name));
+    }
+
+    /// Says if an axis is not drawn in proportion.
+    fn note(&self, axis: usize) -> String {
+        match axis {
+            axis if self.labels[axis].is_uneven() => ", unevenly spaced".into(),
+            2 if self.exaggeration != 1.0 => format!(", {} times as tall", text(self.exaggeration)),
+            _ => String::new(),
+        }
     }
 
     /// The values along an edge: as many as fit up to [`MOST_TICKS`], or none, since one alone tells no scale.
     fn ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
         let [first, last] = self.ends(edge.axis).map(|voxel| self.labels[edge.axis].coordinate(voxel));
+        if self.labels[edge.axis].is_uneven() {
+            return self.uneven_ticks(edge, letters, rim);
+        }
         let all = all_round_values(first.min(last), first.max(last), MOST_TICKS);
         let mut all: Vec<Vec<Tick>> = all.map(|values| self.placed(&values, edge, letters, rim)).collect();
         if all.first().is_some_and(|ticks| ticks.len() == MOST_TICKS) && all.get(1).is_some_and(|next| next.len() > 3) {
@@ -168,6 +208,22 @@ impl VolumeAxes {
         let fits = |ticks: &&Vec<Tick>| ticks.len() > 1 && ticks.windows(2).all(|pair| !pair[0].touches(&pair[1]));
         let found = all.iter().find(fits).cloned().or_else(|| all.into_iter().next().map(thinned));
         found.filter(|ticks| ticks.len() > 1).unwrap_or_default()
+    }
+
+    /// The values along an edge of an uneven axis: the roundest ones that do not touch.
+    fn uneven_ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
+        // Half a voxel beyond the ends means little where voxels are unlike.
+        let region = [self.region.start[edge.axis], self.region.end[edge.axis] - 1];
+        let [first, last] = region.map(|voxel| self.labels[edge.axis].coordinate(voxel as f64));
+        let values = roundest(first.min(last), first.max(last));
+        let mut kept: Vec<Tick> = Vec::new();
+        for tick in values.iter().flat_map(|value| self.placed(&[*value], edge, letters, rim)) {
+            if kept.len() < MOST_UNEVEN && kept.iter().all(|other| !other.touches(&tick)) {
+                kept.push(tick);
+            }
+        }
+        kept.sort_by(|a, b| a.share.total_cmp(&b.share));
+        if kept.len() > 1 { kept } else { Vec::new() }
     }
 
     /// Values at their places beside an edge.
@@ -215,7 +271,11 @@ impl VolumeAxes {
     /// Draws arrows along x, y and z at the lower left.
     pub(super) fn draw_triad(&self, canvas: &mut Canvas<'_>, camera: &Camera) {
         let size = canvas.letters.size;
-        let origin = [2.6 * size, canvas.size()[1] - 2.6 * size];
+        let [width, height] = canvas.size();
+        let room = 2.6 * size;
+        let places = [[room, height - room], [width - room, height - room], [room, room], [width - room, room]];
+        let corners = |at: [f64; 2]| [at.map(|n| n - room), at.map(|n| n + room)];
+        let Some(origin) = places.into_iter().find(|at| canvas.is_free(&corners(*at))) else { return };
         let at = |axis: usize, length: f64| {
             let [x, y, _] = camera.step(axis, length / camera.scale);
             [origin[0] + x, origin[1] + y]
@@ -233,6 +293,12 @@ impl AxisLabels {
         let steps = || self.at.windows(2).map(|pair| pair[1] - pair[0]);
         let mean = steps().sum::<f64>() / steps().len() as f64;
         steps().all(|step| (step / mean - 1.0).abs() < EVEN).then_some(mean.abs())
+    }
+
+    /// Whether steps differ so much that no even scale would be true.
+    fn is_uneven(&self) -> bool {
+        let steps = || self.at.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        steps().fold(0.0, f64::max) > UNEVEN * steps().fold(f64::INFINITY, f64::min)
     }
 
     /// The name and the unit.
@@ -301,13 +367,14 @@ fn reach(direction: [f64; 2], half: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::layout::{Margins, Parts, margins};
     use super::*;
     use wavesplat_core::view::camera::View;
 
     fn axes(grid: Grid) -> VolumeAxes {
         let at = |a: usize| (0..grid.dims[a]).map(|n| grid.origin[a] + n as f64 * grid.spacing[a]).collect();
         let labels = |a: usize| AxisLabels { name: ["x", "y", "z"][a].into(), unit: "m".into(), at: at(a) };
-        VolumeAxes { grid, region: grid.whole(), rim: 0.0, labels: [0, 1, 2].map(labels) }
+        VolumeAxes { grid, region: grid.whole(), rim: 0.0, exaggeration: 1.0, labels: [0, 1, 2].map(labels) }
     }
 
     #[test]
@@ -333,6 +400,104 @@ mod tests {
     fn beside(volume: &VolumeAxes, axis: usize, length: f64) -> Vec<Tick> {
         let (along, out) = ([0.9 * length, -0.436 * length], [0.436, 0.9]);
         volume.ticks(&Edge { axis, from: [0.0; 2], to: along, out }, &Letters::new(15.0), 0.0)
+    }
+
+    /// Depths of an ocean, and levels of pressure.
+    const DEPTHS: [f64; 12] = [0.0, 3.0, 10.0, 25.0, 50.0, 100.0, 200.0, 300.0, 500.0, 1000.0, 2000.0, 3000.0];
+    const LEVELS: [f64; 10] = [1000.0, 925.0, 850.0, 700.0, 500.0, 300.0, 200.0, 100.0, 50.0, 10.0];
+
+    /// Axes with names, units and coordinates as archives have them, and the size of their volume.
+    fn described() -> Vec<VolumeAxes> {
+        let even = |count: usize, step: f64| Vec::from_iter((0..count).map(|n| n as f64 * step));
+        let named = |name: &str, unit: &str, at: Vec<f64>| AxisLabels { name: name.into(), unit: unit.into(), at };
+        let of = |labels: [AxisLabels; 3], spacing: [f64; 3], exaggeration: f64| {
+            let grid = Grid { dims: labels.each_ref().map(|axis| axis.at.len()), spacing, origin: [0.0; 3] };
+            VolumeAxes { grid, region: grid.whole(), rim: 0.0, exaggeration, labels }
+        };
+        let [x, y] = [named("longitude", "°E", even(40, 0.25)), named("latitude", "°N", even(30, 0.25))];
+        let depth = named("depth", "m", DEPTHS.iter().map(|v| -v).rev().collect());
+        let pressure = named("air_pressure", "hPa", LEVELS.into());
+        let long = named("sea_water_sigma_theta_coordinate_of_the_model", "1e-3 kg m⁻³", even(30, -0.000_123));
+        let voxels = [named("x", "", even(64, 1.0)), named("y", "", even(48, 1.0)), named("z", "", even(20, 1.0))];
+        vec![
+            of([x.clone(), y.clone(), depth], [1.0; 3], 1.0),
+            of([x.clone(), y.clone(), pressure], [1.0, 1.0, 3.0], 1.0),
+            of([x, y, long], [1.0, 1.0, 0.5], 50.0),
+            of(voxels, [1.0; 3], 1.0),
+        ]
+    }
+
+    /// From a thumbnail to 4K, face-on and from anywhere: every axis that has values has its name, and nothing overlaps.
+    #[test]
+    fn names_and_values_stand_side_by_side_in_pictures_of_any_size() {
+        let (mut axes_drawn, mut uneven_drawn) = (0, 0);
+        for (volume, size) in described().iter().flat_map(|volume| SIZES.map(|size| (volume, size))) {
+            for (azimuth, elevation) in
+                [(270.0, 0.0), (180.0, 0.0), (180.0, 90.0), (30.0, 30.0), (215.0, -20.0), (75.0, 60.0)]
+            {
+                let camera = fitting(volume, size, azimuth, elevation);
+                let mut pixels = vec![[0; 3]; size[0] * size[1]];
+                let mut canvas = Canvas::new(&mut pixels, size, [0; 3]);
+                volume.draw_axes(&mut canvas, &camera);
+                let Canvas { taken, written, letters, .. } = canvas;
+                for (n, a) in taken.iter().enumerate() {
+                    let within = (0..2).all(|i| a[0][i] >= 0.0 && a[1][i] <= size[i] as f64);
+                    let alone = taken[n + 1..].iter().all(|b| (0..2).any(|i| a[1][i] <= b[0][i] || b[1][i] <= a[0][i]));
+                    assert!(within && alone, "{size:?} {azimuth} {elevation}: {:?} of {written:?}", written[n]);
+                }
+                for edge in (0..3).filter_map(|axis| volume.edge(&camera, axis)) {
+                    let labels = &volume.labels[edge.axis];
+                    if length([edge.to[0] - edge.from[0], edge.to[1] - edge.from[1]]) < 6.0 * letters.size {
+                        continue;
+                    }
+                    let begins =
+                        |text: &String| text.chars().zip(labels.name.chars()).take_while(|(a, b)| a == b).count();
+                    let named = written.iter().map(begins).max().unwrap_or(0);
+                    assert!(
+                        named >= labels.name.chars().count().min(8),
+                        "{size:?} {azimuth} {elevation}: no {} in {written:?}",
+                        labels.name
+                    );
+                    axes_drawn += 1;
+                    uneven_drawn += usize::from(written.iter().any(|text| text.ends_with("unevenly spaced")));
+                }
+            }
+        }
+        assert!(axes_drawn > 100 && uneven_drawn > 20, "{axes_drawn} {uneven_drawn}");
+    }
+
+    const SIZES: [[usize; 2]; 5] = [[200, 200], [512, 512], [900, 600], [1000, 800], [3840, 2160]];
+
+    /// A camera for which the volume fits beside the margins.
+    fn fitting(volume: &VolumeAxes, size: [usize; 2], azimuth: f64, elevation: f64) -> Camera {
+        let Margins { left, right, top, bottom } = margins(size, Parts::USUAL, true);
+        let inner = [size[0] - left - right, size[1] - top - bottom];
+        let view = View { size: inner, ..View::new(azimuth, elevation) };
+        let camera = Camera::new(&view, &volume.grid).expect("a view");
+        let scale = camera.scale;
+        let [across, up] = [[right, left], [top, bottom]].map(|[a, b]| (a as f64 - b as f64) / 2.0 / scale);
+        let view = View { size, scale: Some(scale), center: Some(camera.moved(across, up)), ..view };
+        Camera::new(&view, &volume.grid).expect("a view")
+    }
+
+    #[test]
+    fn uneven_axes_have_round_values_at_their_places() {
+        let [ocean, air, ..] = &described()[..] else { unreachable!() };
+        for (volume, wanted) in [(ocean, &["0", "−100", "−1000"][..]), (air, &["10", "100", "1000"])] {
+            let ticks = beside(volume, 2, 500.0);
+            assert!(
+                ticks.len() > 5 && wanted.iter().all(|value| ticks.iter().any(|tick| tick.text == *value)),
+                "{ticks:?}"
+            );
+            for Tick { text, share, .. } in &ticks {
+                let value: f64 = text.replace('−', "-").parse().expect("a number");
+                let voxel = share * volume.grid.dims[2] as f64 - 0.5;
+                assert!(
+                    (volume.labels[2].coordinate(voxel) - value).abs() < 1e-9 * value.abs().max(1.0),
+                    "{text} at {voxel}"
+                );
+            }
+        }
     }
 
     #[test]

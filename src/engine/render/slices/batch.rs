@@ -101,7 +101,7 @@ impl<B: Blend> SlicePass<'_, B> {
         report: &mut RenderReport,
     ) -> Result<Swept<B>> {
         let SampleReader { batch, blocks, progress, .. } = *self.reader;
-        let known = Known::new(self.view, blocks, batch.selection());
+        let known = Known::new(self.view, blocks, batch.selection(), self.blend.reads_beside());
         let (units, most) = (self.units(&known)?, most_layers(self.view, blocks));
         let of_frame = |(units, groups): (&Units, _)| Frame::new(self.view, most, *units, groups);
         let mut frames: Vec<Frame<B>> = units.par_iter().zip(groups).map(of_frame).collect();

@@ -113,15 +113,15 @@ pub(super) fn pixel_of_errors(cells: [&[[f32; 4]; 4]; 4], [across, down]: [[f32;
     out.fill(if error < 1.0 { error } else { 1.0 }); // light and opacity are from 0 to 1
 }
 
-/// Bytes of the second sweep of `frames` frames.
-pub(in crate::render) fn certificate_bytes(
+/// Bytes of the second sweep of `frames` frames by a certificate.
+pub(in crate::render) fn second_bytes<C: Blend>(
     view: &SlicedView,
     frames: usize,
     blocks: BlockGrid,
     is_shaded: bool,
 ) -> usize {
     let pixels = view.camera.size.iter().product::<usize>() * size_of::<f32>();
-    bytes::<Certificate<'_>>(view, frames, blocks, is_shaded) + frames * pixels
+    bytes::<C>(view, frames, blocks, is_shaded) + frames * pixels + FieldErrors::bytes(blocks)
 }
 
 impl Bounded {

@@ -11,6 +11,9 @@ pub(super) struct Interval {
 }
 
 impl Interval {
+    /// No number: nothing is in it, and a hull with it changes nothing.
+    pub(super) const NONE: Self = Self { least: f32::INFINITY, most: f32::NEG_INFINITY };
+
     fn around(number: f32, off: f32) -> Self {
         Self { least: number - off, most: number + off }
     }
@@ -52,20 +55,22 @@ impl Interval {
 pub(super) struct Place {
     pub(super) point: CoverPoint,
     pub(super) error: f32,
-    /// The error of the gradient per world unit, and of its change per voxel along b, c and a.
+    /// The length of the gradient's error, per world unit; and the error of its components, per voxel along b, c and a.
     pub(super) gradient_error: f32,
-    pub(super) errors: [f32; 3],
+    pub(super) errors_per_voxel: [f32; 3],
     /// The change of the field along the ray per voxel along a.
     pub(super) rise: f32,
     pub(super) rise_error: f32,
 }
 
 impl Place {
-    fn rises(&self) -> Interval {
-        Interval::around(self.rise, self.rise_error)
+    /// Whether the field rises along the ray; `None` if that is not certain.
+    fn rises(&self) -> Option<bool> {
+        (self.rise.abs() > self.rise_error).then_some(self.rise > 0.0)
     }
 
-    fn below(&self, value: f32) -> Option<bool> {
+    /// Whether the field is below a value; `None` if that is not certain.
+    pub(super) fn below(&self, value: f32) -> Option<bool> {
         let over = self.point.value - value;
         (over.abs() > self.error).then_some(over < 0.0)
     }
@@ -85,7 +90,7 @@ pub(super) struct Shown {
 pub(super) struct MayShow {
     /// The field passes the value.
     pub(super) passed: Option<Shown>,
-    /// The ray turns back before it, or behind it.
+    /// The ray turns back before it, or behind it. It may show less, or not at all: that depends on the samples around.
     pub(super) turned: Option<Shown>,
 }
 
@@ -108,35 +113,28 @@ struct Change {
 impl Step<'_> {
     /// Whether the field turns along the ray; `None` if that is not certain.
     pub(super) fn turns(&self) -> Option<bool> {
-        let [a, b] = [self.from.rises(), self.to.rises()];
-        if a.holds(0.0) || b.holds(0.0) {
-            return None;
-        }
-        Some((a.least > 0.0) != (b.least > 0.0))
+        self.from.rises().zip(self.to.rises()).map(|(a, b)| a != b)
     }
 
-    /// Whether the value changes by more than its errors.
-    pub(super) fn is_certain_change(&self) -> bool {
-        (self.to.point.value - self.from.point.value).abs() > self.from.error + self.to.error
+    /// Whether the field rises or falls for sure from slice to slice, as it does at both slices.
+    pub(super) fn is_monotone(&self) -> bool {
+        let change = self.to.point.value - self.from.point.value;
+        let is_certain = change.abs() > self.from.error + self.to.error;
+        is_certain && self.turns() == Some(false) && self.from.rises() == Some(change > 0.0)
     }
 
     /// The ways in which the surface of a value may show.
     pub(super) fn may_show(&self, value: f32, of_surface: f32) -> MayShow {
         let passes = self.from.below(value).zip(self.to.below(value)).map(|(a, b)| a != b);
         let passed = (passes != Some(false)).then(|| self.passed(value, of_surface));
-        let turned = (passes != Some(true) && self.turns() != Some(false)).then(|| self.turned(value, of_surface));
-        let is_certain = passes == Some(false) && self.turns() == Some(true) && self.is_towards(value) == Some(true);
-        let turned = turned.flatten().map(|shown| {
-            let least = if is_certain { shown.opacity.least } else { 0.0 };
-            Shown { opacity: Interval { least, ..shown.opacity }, ..shown }
-        });
+        let may_turn = passes != Some(true) && self.turns() != Some(false);
+        let turned = if may_turn { self.turned(value, of_surface) } else { None };
         MayShow { passed, turned: turned.filter(|shown| shown.opacity.most > 0.0) }
     }
 
     /// Whether the first rise leads to the value; `None` if that is not certain.
     fn is_towards(&self, value: f32) -> Option<bool> {
-        let rises = (self.from.rise.abs() > self.from.rise_error).then_some(self.from.rise > 0.0);
-        rises.zip(self.from.below(value)).map(|(rises, below)| rises == below)
+        self.from.rises().zip(self.from.below(value)).map(|(rises, below)| rises == below)
     }
 
     fn passed(&self, value: f32, of_surface: f32) -> Shown {
@@ -165,30 +163,36 @@ impl Step<'_> {
         let over = self.turning_value(share);
         let over = Interval { least: over.least - value, most: over.most - value };
         let under = Interval { least: -over.most, most: -over.least };
-        let height = match (self.from.rise > self.from.rise_error, -self.from.rise > self.from.rise_error) {
-            (true, _) => over,
-            (_, true) => under,
-            _ => over.hull(under),
+        let height = match self.from.rises() {
+            Some(true) => over,
+            Some(false) => under,
+            None => over.hull(under),
         };
         let change = self.change(share);
         let (covered, within) = (self.of_height(height, &change), self.within(share, &change, self.bend()));
         let both = |x: f32| x * of_surface * (2.0 - of_surface);
-        let opacity = Interval { least: both(covered.least * within.least), most: both(covered.most * within.most) };
+        let opacity = Interval { least: 0.0, most: both(covered.most * within.most) };
         Some(Shown { opacity, share })
+    }
+
+    /// Voxels along a between the slices, as they are drawn.
+    fn length(&self) -> f32 {
+        self.to.point.at[2] - self.from.point.at[2]
     }
 
     /// The change of the rise along the ray.
     fn bend(&self) -> Interval {
         let off = self.from.rise_error + self.to.rise_error;
-        Interval::around(self.to.rise - self.from.rise, off).map(|change| change / self.rays.between)
+        Interval::around(self.to.rise - self.from.rise, off).map(|change| change / self.length())
     }
 
     fn change(&self, share: Interval) -> Change {
         let (middle, half) = (share.middle(), share.half());
         let [from, to] = [self.from, self.to].map(|place| place.point.gradient);
         let gradient = std::array::from_fn(|i| from[i] + middle * (to[i] - from[i]));
-        let off: [f32; 3] =
-            std::array::from_fn(|i| self.from.errors[i].max(self.to.errors[i]) + half * (to[i] - from[i]).abs());
+        let off: [f32; 3] = std::array::from_fn(|i| {
+            self.from.errors_per_voxel[i].max(self.to.errors_per_voxel[i]) + half * (to[i] - from[i]).abs()
+        });
         let of_ray = self.from.rise_error.max(self.to.rise_error) + half * (self.to.rise - self.from.rise).abs();
         let rise = Interval::around(self.rays.rise(&gradient), of_ray);
         let across = Interval::size(gradient[0].hypot(gradient[1]), off[0].hypot(off[1]));
@@ -234,7 +238,7 @@ impl Step<'_> {
     /// The value where the ray turns back, by a cubic (as in [`Rays::meeting`]).
     fn turning_value(&self, share: Interval) -> Interval {
         let [from, to] = [self.from, self.to];
-        let (s, length) = (share.middle(), self.rays.between);
+        let (s, length) = (share.middle(), self.length());
         let rest = 1.0 - s;
         let ends = rest * rest * (1.0 + 2.0 * s) * from.point.value + s * s * (3.0 - 2.0 * s) * to.point.value;
         let middle = ends + length * s * rest * (rest * from.rise - s * to.rise);
@@ -264,7 +268,7 @@ impl Step<'_> {
         let [from, to] = [self.from, self.to].map(|place| place.point.at);
         let at = std::array::from_fn(|i| from[i] + share.middle() * (to[i] - from[i]));
         let of_axis = |axis: usize| {
-            let off = share.half() * (to[axis] - from[axis]).abs();
+            let off = share.half() * (to[axis] - from[axis]).abs() + 2.0 * f32::EPSILON * to[axis].abs();
             let distance = Interval::around(self.rays.distance(axis, &at), off);
             if distance.least >= FAR {
                 return Interval { least: 1.0, most: 1.0 };
@@ -310,7 +314,8 @@ mod tests {
     use super::super::cover::tests::Random;
     use super::*;
 
-    const COUNT: [f32; 3] = [12.0, 9.0, 14.0];
+    /// A long volume, where places are less precise.
+    const COUNT: [f32; 3] = [12.0, 9.0, 2014.0];
 
     fn place(random: &mut Random, rays: &Rays, at: [f32; 3], error: f32) -> Place {
         let gradient = std::array::from_fn(|_| random.next());
@@ -318,7 +323,7 @@ mod tests {
         let gradient_error = error * (1.0 + random.next());
         let along = rays.direction.iter().map(|d| d * d).sum::<f32>().sqrt();
         let (rise, rise_error) = (rays.rise(&gradient), gradient_error * along);
-        Place { point, error, gradient_error, errors: [gradient_error; 3], rise, rise_error }
+        Place { point, error, gradient_error, errors_per_voxel: [gradient_error; 3], rise, rise_error }
     }
 
     /// A field within the errors; often at their ends.
@@ -341,7 +346,8 @@ mod tests {
             let direction = [random.next(), random.next(), 1.0];
             let rays =
                 Rays { direction, between: [0.25, 0.5, 1.0][n % 3], width: [0.25, 0.5, 2.0][n / 3 % 3], count: COUNT };
-            let first: [f32; 3] = std::array::from_fn(|i| (random.next() + 1.0) * 0.5 * COUNT[i] - 0.5);
+            let (place_in, far) = ([12.0, 9.0, 14.0], [0.0, 0.0, if n % 2 == 0 { 0.0 } else { 2000.0 }]);
+            let first: [f32; 3] = std::array::from_fn(|i| (random.next() + 1.0) * 0.5 * place_in[i] - 0.5 + far[i]);
             let last = std::array::from_fn(|i| first[i] + rays.between * direction[i]);
             let error = 0.3 * random.next().abs().powi(6);
             let (from, to) = (place(&mut random, &rays, first, error), place(&mut random, &rays, last, error));

@@ -48,6 +48,11 @@ impl<'a> FieldErrors<'a> {
         Self { view, blocks, near, of_frames, most, of_gradient, of_absence }
     }
 
+    /// Bytes for so many blocks: ranges, those around them, and bounds.
+    pub(super) fn bytes(blocks: BlockGrid) -> usize {
+        blocks.len() * (3 * size_of::<(f64, f64)>() + size_of::<f32>())
+    }
+
     /// Bounds the error of the gradient (eq 41), in units per world unit. Samples are off by at most `error`; `present` is the share of the
     /// kernel's weights that meet samples. The gradient is divided by this share. Where the share changes, the error of the mean adds to it.
     #[inline(always)]

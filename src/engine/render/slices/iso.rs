@@ -2,12 +2,12 @@
 //! and goes behind the surfaces in front of it. Surfaces end at the faces of the volume. At their edges they cover a part of
 //! a cell ([`super::cover`]).
 
-use super::GROUP;
 use super::blend::{off_light, pixel_of_light};
 use super::cover::{CoverPoint, Rays, Slope};
 use super::row::{Blend, Point, Row, RowGroups};
 use super::shade::Shader;
 use super::view::SlicedView;
+use super::{BRICK_ROWS, GROUP};
 use crate::render::batches::Units;
 use crate::render::light::{Light, Surface};
 use wavesplat_core::base::vectors::dispatch;
@@ -21,8 +21,8 @@ pub(in crate::render) struct Isosurfaces {
     pub(super) shader: Shader,
     pub(super) rays: Rays,
     pub(super) units: Units,
-    /// How far beyond the values of samples surfaces are looked for, in units: 0 unless errors are bounded.
-    pub(super) beyond: f32,
+    /// How far beyond the values of samples surfaces are looked for, in units, if errors are bounded.
+    pub(super) beyond: Option<f32>,
 }
 
 /// Sixteen cells.
@@ -44,7 +44,7 @@ impl Isosurfaces {
         let zero = surfaces[0].value;
         let units = Units { zero, per: if most > 0.0 { 1.0 / most } else { 1.0 } };
         let values = surfaces.iter().map(|surface| units.number(surface.value)).collect();
-        Self { surfaces, values, shader, rays: Rays::new(view), units, beyond: 0.0 }
+        Self { surfaces, values, shader, rays: Rays::new(view), units, beyond: None }
     }
 
     /// Adds the surfaces between two points of a ray behind those in front of them.
@@ -91,8 +91,14 @@ impl Blend for Isosurfaces {
     }
 
     fn shows(&self, range: (f32, f32)) -> bool {
-        let (least, largest) = (range.0 - self.beyond, range.1 + self.beyond);
+        let beyond = self.beyond.unwrap_or(0.0);
+        let (least, largest) = (range.0 - beyond, range.1 + beyond);
         self.values.iter().any(|value| least <= *value && *value <= largest)
+    }
+
+    /// A surface that is almost reached shows in cells that are looked at because of others: their blocks must be true then.
+    fn reads_beside(&self) -> [usize; 2] {
+        if self.beyond.is_some() { [2 * GROUP, 2 * BRICK_ROWS] } else { [0; 2] }
     }
 
     fn add(&self, row: &Row<'_>, RowGroups { states, limits, live, .. }: RowGroups<'_, Front>) {

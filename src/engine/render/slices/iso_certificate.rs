@@ -9,11 +9,12 @@
 //! |C' - C| <= sum over runs of T' |a' (c' - R) - a (c - R)|                                               (eq 50)
 //! ```
 //!
-//! Where a surface may show in a run, c' follows from the gradients and their errors. Its opacity is the least that a' can be if the
-//! sides at both ends differ and the surface covers all of the cell for sure; else that is 0.
+//! Where a surface may show in a run, a' follows from how far its edges may move ([`super::cover_bounds`]), and c' from the gradients that
+//! are possible. Whether a surface shows that a ray almost reaches depends on the samples far around, so nothing is known of its least
+//! opacity. As for composites, the original is drawn to the end of its rays.
 
 use super::GROUP;
-use super::batch::{SlicePass, Swept, bytes};
+use super::batch::{SlicePass, Swept};
 use super::certificate::{OF_SUM, OF_THROUGH, errors_of_pixels, pixel_of_errors, second_sweep};
 use super::cover::Slope;
 use super::cover_bounds::{Interval, MayShow, Place, Step};
@@ -23,9 +24,9 @@ use super::iso::{Front, Isosurfaces, slope};
 use super::row::{Blend, CLOSED, Point, Row, RowGroups};
 use super::view::SlicedView;
 use crate::render::batches::{SampleReader, Units};
+use crate::render::light::MOST_SURFACES;
 use crate::render::report::RenderReport;
 use wavesplat_core::base::error::Result;
-use wavesplat_core::base::grid::BlockGrid;
 use wavesplat_core::base::vectors::dispatch;
 
 /// The second sweep of isosurfaces, which bounds their errors.
@@ -54,12 +55,10 @@ struct Run {
     below: Option<u64>,
     /// The drawn light before the run.
     start: [f32; 4],
-    /// The surface that may show, if it is one.
-    surface: Shows,
-    /// The opacities of that surface where the field passes its value, over all steps.
+    /// The surfaces that may show.
+    shown: u64,
+    /// The opacities of a surface where the field passes its value, over all steps and surfaces.
     passed: Interval,
-    /// Its least opacity if the field passes its value in no step.
-    least_turned: f32,
     /// Whether the field only rises, or only falls.
     is_monotone: bool,
     /// The least share of light that comes through.
@@ -67,14 +66,6 @@ struct Run {
     /// The least and the largest light of all surfaces that may show.
     dark: [f32; 3],
     bright: [f32; 3],
-}
-
-/// The surfaces that may show in a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Shows {
-    Nothing,
-    One(usize),
-    Several,
 }
 
 /// Sixteen cells.
@@ -99,7 +90,7 @@ pub(in crate::render) fn seen_with_errors(
     reader: &SampleReader<'_>,
 ) -> Isosurfaces {
     let beyond = FieldErrors::new(view, reader, &surfaces.units).most;
-    Isosurfaces { beyond, ..surfaces }
+    Isosurfaces { beyond: Some(beyond), ..surfaces }
 }
 
 /// Bounds of the errors of all frames' pixels: the largest of a pixel's light and opacity.
@@ -121,12 +112,6 @@ pub(in crate::render) fn iso_errors(
     errors_of_pixels(bounded, pass, report)
 }
 
-/// Bytes of the second sweep of `frames` frames.
-pub(in crate::render) fn iso_bytes(view: &SlicedView, frames: usize, blocks: BlockGrid, is_shaded: bool) -> usize {
-    let pixels = view.camera.size.iter().product::<usize>() * size_of::<f32>();
-    bytes::<IsoCertificate<'_>>(view, frames, blocks, is_shaded) + frames * pixels
-}
-
 impl<'a> IsoCertificate<'a> {
     fn new(pass: &SlicePass<'a, Isosurfaces>) -> Self {
         let SlicePass { view, blend: surfaces, reader, .. } = *pass;
@@ -138,7 +123,7 @@ impl<'a> IsoCertificate<'a> {
 
     /// The field at a group of cells.
     fn field(&self, row: &Row<'_>, group: usize, frame: u32) -> Field {
-        let error = self.errors.of_group(frame as usize, row.place, group) * WHOLE;
+        let error = self.errors.of_group(frame as usize, row.place, group);
         let slope = dispatch!(slope(row, group));
         let (_, lengths) = row.means(group);
         let gradient_errors = std::array::from_fn(|i| self.errors.of_gradient(error, lengths[i] / row.density));
@@ -151,22 +136,15 @@ impl<'a> IsoCertificate<'a> {
         let steep = (0..3).map(|i| point.gradient[i].abs() / self.spacing[i]).fold(0.0, f32::max);
         let gradient_error = field.gradient_errors[i] + ROUNDING * steep;
         let (rise, rise_error) = (self.surfaces.rays.rise(&point.gradient), gradient_error * self.ray);
-        let errors = self.spacing.map(|spacing| spacing * gradient_error);
+        let errors_per_voxel = self.spacing.map(|spacing| spacing * gradient_error);
         let error = field.error + ROUNDING * point.value.abs();
-        Place { point, error, gradient_error, errors, rise, rise_error }
+        Place { point, error, gradient_error, errors_per_voxel, rise, rise_error }
     }
 
     /// The values that the field is below; `None` unless it is certain for all.
     fn below(&self, place: &Place) -> Option<u64> {
-        let mut below = 0;
-        for (n, value) in self.surfaces.values.iter().enumerate() {
-            let over = place.point.value - value;
-            if over.abs() <= place.error {
-                return None;
-            }
-            below |= u64::from(over < 0.0) << n;
-        }
-        Some(below)
+        let bit = |(n, value): (usize, &f32)| Some(u64::from(place.below(*value)?) << n);
+        self.surfaces.values.iter().enumerate().try_fold(0, |below, surface| Some(below | bit(surface)?))
     }
 
     /// Goes on from one slice to the next in one cell.
@@ -178,7 +156,7 @@ impl<'a> IsoCertificate<'a> {
         let start = group.front.light[i];
         let run = group.runs[i].get_or_insert_with(|| Run::new(self.below(from), start));
         let step = Step { rays: &self.surfaces.rays, from, to };
-        run.is_monotone &= step.turns() == Some(false) && step.is_certain_change();
+        run.is_monotone &= step.is_monotone();
         for (n, value) in self.surfaces.values.iter().enumerate() {
             self.add_surface(run, n, &step, step.may_show(*value, self.opacity(n)));
         }
@@ -194,17 +172,12 @@ impl<'a> IsoCertificate<'a> {
         let Some(share) = [passed, turned].into_iter().flatten().map(|shown| shown.share).reduce(Interval::hull) else {
             return;
         };
-        run.surface = match run.surface {
-            Shows::Nothing => Shows::One(n),
-            surface if surface == Shows::One(n) => surface,
-            _ => Shows::Several,
-        };
+        run.shown |= 1 << n;
         let most = [passed, turned].into_iter().flatten().map(|shown| shown.opacity.most).fold(0.0, f32::max);
         run.through *= 1.0 - most;
         if let Some(passed) = passed {
             run.passed = run.passed.hull(passed.opacity);
         }
-        run.least_turned = run.least_turned.max(turned.map_or(0.0, |turned| turned.opacity.least));
         self.add_light(run, n, step, share);
     }
 
@@ -234,29 +207,18 @@ impl<'a> IsoCertificate<'a> {
 
 impl Run {
     const fn new(below: Option<u64>, start: [f32; 4]) -> Self {
-        let passed = Interval { least: 1.0, most: 0.0 };
-        Self {
-            below,
-            start,
-            surface: Shows::Nothing,
-            passed,
-            least_turned: 0.0,
-            is_monotone: true,
-            through: 1.0,
-            dark: [1.0; 3],
-            bright: [0.0; 3],
-        }
+        let (passed, is_monotone) = (Interval::NONE, true);
+        Self { below, start, shown: 0, passed, is_monotone, through: 1.0, dark: [1.0; 3], bright: [0.0; 3] }
     }
 
-    /// The opacity that the original may have in a run that ends where the field is below these values. The least one holds for a surface
-    /// alone: a second one might hide it.
+    /// The opacity that the original may have in a run that ends where the field is below these values. If it passes a value for sure, that
+    /// surface shows, whatever else does. It passes one value once if it only rises or only falls.
     fn opacity(&self, below: Option<u64>) -> Interval {
-        let any = Interval { least: 0.0, most: 1.0 - self.through };
-        let (Shows::One(n), Some((from, to))) = (self.surface, self.below.zip(below)) else { return any };
-        match ((from ^ to) >> n & 1 == 1, self.is_monotone) {
-            (true, true) => self.passed,
-            (true, false) => Interval { least: self.passed.least, ..any },
-            (false, _) => Interval { least: self.least_turned, ..any },
+        let passes = self.below.zip(below).is_some_and(|(from, to)| from != to);
+        let is_single = passes && self.is_monotone && self.shown.is_power_of_two();
+        Interval {
+            least: if passes { self.passed.least } else { 0.0 },
+            most: if is_single { self.passed.most } else { 1.0 - self.through },
         }
     }
 }
@@ -281,8 +243,8 @@ impl Bounded {
         for c in 0..4 {
             let behind = rest(&drawn, &end, c);
             let light = if c < 3 { per_light(f64::from(end[c]) - f64::from(start[c])) } else { 0.0 };
-            let found = light - covered * behind;
-            let at = |opacity: f32, light: f32| f64::from(opacity) * (f64::from(light) - behind) - found;
+            let term = light - covered * behind; // a (c - R)
+            let at = |opacity: f32, light: f32| f64::from(opacity) * (f64::from(light) - behind) - term;
             let [dark, bright] = if c < 3 { [run.dark[c], run.bright[c]] } else { [0.0; 2] };
             let ends = [at(least, dark), at(least, bright), at(most, dark), at(most, bright)];
             let off = ends.into_iter().map(f64::abs).fold(0.0, f64::max) as f32;
@@ -312,12 +274,13 @@ fn rest(drawn: &[f32; 4], light: &[f32; 4], c: usize) -> f64 {
     }
 }
 
-/// Sums of weights of groups that count as whole are at most this.
-const WHOLE: f32 = 1.0 + 3e-4;
 /// For the rounding of products.
 const ALLOWANCE: f32 = 1.0 + 1e-3;
 /// The rounding of sums and products of few numbers.
 const ROUNDING: f32 = 1e-6;
+
+/// Surfaces are the bits of a word.
+const _: () = assert!(MOST_SURFACES <= u64::BITS as usize);
 
 impl Blend for IsoCertificate<'_> {
     type Group = Bounded;
@@ -339,6 +302,10 @@ impl Blend for IsoCertificate<'_> {
 
     fn shows(&self, range: (f32, f32)) -> bool {
         self.surfaces.shows(range)
+    }
+
+    fn reads_beside(&self) -> [usize; 2] {
+        self.surfaces.reads_beside()
     }
 
     fn add(&self, row: &Row<'_>, RowGroups { states, limits, live, .. }: RowGroups<'_, Bounded>) {
@@ -406,7 +373,8 @@ fn near(from: &Field, to: &Field, of: &IsoCertificate<'_>) -> u32 {
             across + field.gradient_errors[i] * (of.spacing[0] + of.spacing[1])
         });
         let across = if one > other { one } else { other };
-        *reached = error + ALLOWANCE * (0.5 * rays.between * (first + last) + 0.5 * rays.width * across);
+        let rounding = ROUNDING * (from.slope.values[i].abs() + to.slope.values[i].abs());
+        *reached = error + rounding + ALLOWANCE * (0.5 * rays.between * (first + last) + 0.5 * rays.width * across);
     }
     for value in &of.surfaces.values {
         for i in 0..GROUP {

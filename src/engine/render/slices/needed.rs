@@ -32,12 +32,14 @@ pub(super) enum Need {
 const INVERTED: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
 
 impl<'a> Known<'a> {
-    pub(super) fn new(view: &'a SlicedView, blocks: BlockGrid, selection: &Selection) -> Self {
+    /// The facts; a block is needed also for cells up to so many voxels along b and c from those that it reaches.
+    pub(super) fn new(view: &'a SlicedView, blocks: BlockGrid, selection: &Selection, [b, c]: [usize; 2]) -> Self {
         let (mut ranges, mut has_values) = (vec![INVERTED; blocks.len()], vec![false; blocks.len()]);
         selection.ranges.iter().for_each(|known| ranges[known.block] = known.range);
         selection.blocks.iter().for_each(|block| has_values[*block] = true);
         // Cells that a block reaches are also reached by others.
-        let wide = around(view, blocks, ranges.clone(), |i| 2 * (view.reach[i] + view.margin[i]) - 1);
+        let beside = [b, c, 0];
+        let wide = around(view, blocks, ranges.clone(), |i| 2 * (view.reach[i] + view.margin[i]) - 1 + beside[i]);
         Self { view, blocks, ranges, wide, has_values }
     }
 

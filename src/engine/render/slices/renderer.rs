@@ -2,9 +2,9 @@
 
 use super::batch::{SlicePass, Swept, bytes};
 use super::blend::Composite;
-use super::certificate::{certificate_bytes, pixel_errors};
+use super::certificate::{Certificate, pixel_errors, second_bytes};
 use super::iso::Isosurfaces;
-use super::iso_certificate::{iso_bytes, iso_errors, seen_with_errors};
+use super::iso_certificate::{IsoCertificate, iso_errors, seen_with_errors};
 use super::row::Blend;
 use super::stops::Stops;
 use super::view::SlicedView;
@@ -45,7 +45,7 @@ impl Sliced<'_, Composite> {
     pub(in crate::render) fn certified(self) -> Self {
         let views = self.views.iter().map(SlicedView::slice_by_slice).collect();
         let blend = |composite: Composite, _: &SlicedView, _: &SampleReader<'_>| composite.by_lengths();
-        let certifier = Some(Certifier { blend, errors: pixel_errors, bytes: certificate_bytes });
+        let certifier = Some(Certifier { blend, errors: pixel_errors, bytes: second_bytes::<Certificate<'_>> });
         Self { views, certifier, ..self }
     }
 }
@@ -53,7 +53,14 @@ impl Sliced<'_, Composite> {
 impl Sliced<'_, Isosurfaces> {
     /// The same with bounds of the errors of all pixels.
     pub(in crate::render) fn certified(self) -> Self {
-        Self { certifier: Some(Certifier { blend: seen_with_errors, errors: iso_errors, bytes: iso_bytes }), ..self }
+        Self {
+            certifier: Some(Certifier {
+                blend: seen_with_errors,
+                errors: iso_errors,
+                bytes: second_bytes::<IsoCertificate<'_>>,
+            }),
+            ..self
+        }
     }
 }
 

@@ -226,6 +226,11 @@ pub(in crate::render) trait Blend: Sync {
     /// Whether any value in this range is visible.
     fn shows(&self, range: (f32, f32)) -> bool;
 
+    /// Voxels along b and c, beside those that visible cells need, whose blocks are read as well.
+    fn reads_beside(&self) -> [usize; 2] {
+        [0; 2]
+    }
+
     /// Whether cells with this limit hide all values in this range.
     fn hides(limit: f32, _range: (f32, f32)) -> bool {
         Self::is_closed(limit)

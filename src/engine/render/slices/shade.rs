@@ -96,8 +96,21 @@ impl Shader {
         let way: [f32; 3] = std::array::from_fn(|i| to[i] / most - from[i] / most);
         let at = std::array::from_fn(|i| from[i] / most + middle * way[i]);
         let way = [way[0] * self.per[0], way[1] * self.per[1], way[2] * self.per[2]];
-        let (lit, doubt) = (self.shade_cell(at), self.doubt(at, off / most + half * dot(way, way).sqrt()));
+        let off = off / most + half * dot(way, way).sqrt();
+        let slope = [at[0] * self.per[0], at[1] * self.per[1], at[2] * self.per[2]];
+        if dot(slope, self.to_viewer).abs() <= off {
+            return self.any_direction(); // also that of no gradient
+        }
+        let (lit, doubt) = (self.shade_cell(at), self.doubt(at, off));
         [-1.0, 1.0].map(|sign| std::array::from_fn(|i| (lit[i] + sign * doubt[i]).max(0.0)))
+    }
+
+    /// [`Self::between`] if nothing is known of gradients. A point without a gradient keeps its colour.
+    fn any_direction(&self) -> [[f32; 2]; 2] {
+        let Light { ambient, diffuse, specular, .. } = self.light;
+        let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
+        let largest = [(ambient + diffuse).max(1.0) + OF_LIGHT, specular + OF_LIGHT];
+        [[(ambient - OF_LIGHT).clamp(0.0, 1.0), 0.0], largest]
     }
 
     /// The most light that a colour gives.

@@ -52,9 +52,10 @@ pub(in crate::picture) fn volume_axes(
     axes: &Axes,
     whole: &Grid,
     config: &RenderConfig,
+    exaggeration: f64,
 ) -> Result<VolumeAxes> {
     let region = request.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
-    Ok(axes_of_region(axes.labels(), whole, region, config))
+    Ok(VolumeAxes { exaggeration, ..axes_of_region(axes.labels(), whole, region, config) })
 }
 
 /// The axes of the voxels that are drawn.
@@ -66,7 +67,7 @@ pub(in crate::picture) fn axes_of_region(
 ) -> VolumeAxes {
     let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. });
     let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
-    VolumeAxes { grid: *whole, region, rim, labels }
+    VolumeAxes { grid: *whole, region, rim, exaggeration: 1.0, labels }
 }
 
 /// Says if a scale that is asked for cannot be drawn.

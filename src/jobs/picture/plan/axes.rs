@@ -77,11 +77,12 @@ impl Axis {
     fn new(grid: &Grid, description: Option<&Description>, along: usize) -> Self {
         let letter = ["x", "y", "z"][along].to_string();
         let own = description.and_then(|all| coordinates(all, along)).filter(|at| at.len() == grid.dims[along]);
-        let regular = || (0..grid.dims[along]).map(|n| grid.origin[along] + grid.spacing[along] * n as f64).collect();
+        let unit = if description.is_some_and(|all| is_counted(all, grid, along)) { grid.spacing[along] } else { 1.0 };
+        let regular = |n: usize| (grid.origin[along] + grid.spacing[along] * n as f64) / unit;
         let (mut names, unit) = description.map_or_else(Default::default, |all| named(all, along));
         names.push(letter);
         names.dedup();
-        Self { names, unit, at: own.unwrap_or_else(regular) }
+        Self { names, unit, at: own.unwrap_or_else(|| (0..grid.dims[along]).map(regular).collect()) }
     }
 
     fn voxel(&self, place: &AxisPosition) -> std::result::Result<f64, String> {
@@ -134,6 +135,14 @@ impl Axis {
         let share = voxel - low as f64;
         if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
     }
+}
+
+/// Whether an axis of an array has no coordinates, and only the spacing of one that has: its voxels are counted.
+fn is_counted(description: &Description, grid: &Grid, along: usize) -> bool {
+    let is_given = |along: usize| coordinates(description, along).is_some();
+    let same = |other: usize| (grid.spacing[other] / grid.spacing[along] - 1.0).abs() < 1e-6;
+    let is_array = description.orientation.is_none() && description.axes.iter().any(|a| a.role.voxels() == Some(along));
+    is_array && !is_given(along) && (0..3).any(|other| is_given(other) && same(other))
 }
 
 /// A number without the digits that come from rounding.

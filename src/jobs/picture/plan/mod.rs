@@ -80,7 +80,8 @@ impl Plan {
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..provenance(request, scene.grid(), &config, file.as_deref(), &annotation.times, &colouring)
         };
-        let annotation = Annotation { axes: Some(volume_axes(request, &axes, &whole, &config)?), ..annotation };
+        let annotation =
+            Annotation { axes: Some(volume_axes(request, &axes, &whole, &config, exaggeration)?), ..annotation };
         note_scale(&annotation, reporter);
         note_title(request, &annotation, &config, reporter);
         Ok(Self { scene, file, config, targets, colouring, provenance, annotation })
