@@ -348,6 +348,34 @@ fn missing_samples_far_away_change_nothing() {
     found.check(&Certified::of_original(&source, &config), "missing far away");
 }
 
+/// Plateaus just below a surface: in the original, it may or may not show around them.
+#[test]
+fn surfaces_that_are_almost_reached_are_certified() {
+    let (grid, frames) = (SKEWED, 1);
+    let samples = Vec::from_iter(field(&grid, frames, 6).into_iter().map(|v| v.min(1.0)));
+    let source = archive(grid, TYPE, &samples);
+    let (mut random, mut shown) = (Random(2), 0);
+    for tolerance in [1e-5, 1e-3] {
+        let config = ConvertConfig { block: Some(4), ..settings(Basis::Haar, 1, tolerance) };
+        let decoded = Decoded::new(grid, &source, &config);
+        let error = decoded.off.iter().copied().fold(0.0, f64::max);
+        for (n, beyond) in [0.2, 0.9, 1.5, 30.0].into_iter().enumerate() {
+            let surface = Surface { value: 1.0 + beyond * error, colour: [0.9, 0.5, 0.2], opacity: [1.0, 0.5][n % 2] };
+            let mode = Mode::Iso { surfaces: vec![surface], slices: None, light: Light::default() };
+            let (azimuth, elevation) = VIEWS[n];
+            let config = certified(view(azimuth, elevation, [[9, 8], [20, 18]][n / 2]), &grid, frames, mode);
+            let found = Certified::of_file(&decoded.file, &config);
+            shown += found.light.chunks_exact(4).filter(|pixel| pixel[3] > 0.0).count();
+            found.check(&Certified::of_original(&source, &config), "the source");
+            for sign in [-1.0, 1.0] {
+                found.check(&Certified::of_original(&decoded.original(grid, |_| sign), &config), "all off alike");
+            }
+            found.check(&Certified::of_original(&decoded.original(grid, |_| random.signed() * 1e9), &config), "random");
+        }
+    }
+    assert!(shown > 20, "{shown} pixels show a surface");
+}
+
 #[test]
 fn modes_that_cannot_be_certified_are_refused() {
     let grid = Grid::unit([6, 6, 6]);

@@ -249,6 +249,27 @@ pub fn coordinates(description: &Description, along: usize) -> Option<Vec<f64>> 
     Some(at)
 }
 
+/// The sides of a patient that the first and the last voxel along an axis lie towards: L, R, A, P, S or I. `None` unless the source says so.
+pub fn sides(description: &Description, along: usize) -> Option<[char; 2]> {
+    let orientation = description.orientation.as_ref()?;
+    let mut voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some());
+    let place = voxels.position(|axis| axis.role.voxels() == Some(along))?;
+    let reversed = description.axes.iter().find(|axis| axis.role.voxels() == Some(along))?.reversed;
+    let direction = orientation.directions.get(place)?;
+    let main = (0..3).max_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs()))?;
+    let [low, high] = match orientation.space.split('-').nth(main)?.to_lowercase().as_str() {
+        "right" => ['L', 'R'],
+        "left" => ['R', 'L'],
+        "anterior" => ['P', 'A'],
+        "posterior" => ['A', 'P'],
+        "superior" => ['I', 'S'],
+        "inferior" => ['S', 'I'],
+        _ => return None,
+    };
+    let ascends = (orientation.spacing[place] * direction[main] > 0.0) != reversed;
+    Some(if ascends { [low, high] } else { [high, low] })
+}
+
 /// Whether coordinates are as far apart as each other, but for rounding to single precision.
 pub fn is_regular(at: &[f64]) -> bool {
     let [first, .., last] = at else { return true };
@@ -299,6 +320,32 @@ mod tests {
             Values::Numbers(numbers) => numbers.to_f64(),
             other => panic!("{other:?}"),
         }
+    }
+
+    #[test]
+    fn sides_follow_the_directions_of_voxels() {
+        let axis = |along: usize, reversed| ArrayAxis {
+            dimension: along as u32,
+            role: [AxisRole::X, AxisRole::Y, AxisRole::Z][along],
+            reversed,
+        };
+        let orientation = |space: &str, directions| {
+            Some(Orientation { space: space.into(), first: [0.0; 3], directions, spacing: [2.0; 3] })
+        };
+        // The axes of the array are z, y, x: the fastest last, whose direction comes first.
+        let of = |space: &str, directions, reversed| Description {
+            axes: vec![axis(2, false), axis(1, reversed), axis(0, false)],
+            orientation: orientation(space, directions),
+            ..Description::default()
+        };
+        let straight = [[-1.0, 0.0, 0.0], [0.0, 0.9, 0.1], [0.0, 0.0, 1.0]];
+        let all = |of: &Description| [0, 1, 2].map(|along| sides(of, along));
+        let text =
+            |found: [Option<[char; 2]>; 3]| found.map(|pair| pair.map_or(String::new(), String::from_iter)).join(" ");
+        assert_eq!(text(all(&of(RAS, straight, false))), "RL PA IS");
+        assert_eq!(text(all(&of(LPS, straight, true))), "LR PA IS");
+        assert_eq!(text(all(&of("scanner-xyz", straight, false))), "  ");
+        assert_eq!(text(all(&of(RAS, [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], false))), "IS LR AP");
     }
 
     #[test]

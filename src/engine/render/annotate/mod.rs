@@ -9,6 +9,7 @@ mod canvas;
 mod layout;
 mod title;
 mod volume;
+mod axis;
 
 pub use canvas::over;
 pub use layout::{Margins, Parts, margins};

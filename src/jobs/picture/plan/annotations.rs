@@ -55,6 +55,7 @@ pub(in crate::picture) fn volume_axes(
     exaggeration: f64,
 ) -> Result<VolumeAxes> {
     let region = request.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
+    let exaggeration = if axes.compare(0, 2) && axes.compare(1, 2) { exaggeration } else { 1.0 };
     Ok(VolumeAxes { exaggeration, ..axes_of_region(axes.labels(), whole, region, config) })
 }
 

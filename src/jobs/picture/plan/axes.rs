@@ -2,10 +2,10 @@
 
 use super::units::{attribute_text, in_letters};
 use crate::picture::values::AxisPosition;
-use wavesplat_core::base::description::{Description, coordinates};
+use wavesplat_core::base::description::{Description, coordinates, is_regular, sides};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
-use wavesplat_engine::file::CoefficientFile;
+use wavesplat_engine::file::{CoefficientFile, setting};
 use wavesplat_engine::render::annotate::AxisLabels;
 
 /// An axis of voxels.
@@ -16,6 +16,8 @@ pub(crate) struct Axis {
     unit: String,
     /// The coordinate of every voxel.
     at: Vec<f64>,
+    /// The sides of a patient at the ends, if they are known.
+    sides: Option<[char; 2]>,
 }
 
 /// The axes x, y and z of all voxels, at their true places.
@@ -23,16 +25,16 @@ pub(crate) struct Axis {
 pub(crate) struct Axes([Axis; 3]);
 
 impl Axes {
-    /// The axes of a grid with true heights, with names and units from the source's description.
-    pub(crate) fn new(grid: &Grid, description: Option<&Description>) -> Self {
-        Self(std::array::from_fn(|along| Axis::new(grid, description, along)))
+    /// The axes of a grid with true heights, with names and units from the source's description. `unit` is that of the grid, if it is known.
+    pub(crate) fn new(grid: &Grid, unit: Option<&str>, description: Option<&Description>) -> Self {
+        Self(std::array::from_fn(|along| Axis::new(grid, unit, description, along)))
     }
 
     /// The axes of a coefficient file.
     pub(crate) fn from_file(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
         let grid = Grid { dims: m.dims.map(|n| n as usize), spacing: m.spacing, origin: m.origin };
-        Ok(Self::new(&grid, file.description()?.as_ref()))
+        Ok(Self::new(&grid, setting(m, "space-units"), file.description()?.as_ref()))
     }
 
     /// The number of the axis with a name, or with the only name that begins like this.
@@ -63,7 +65,13 @@ impl Axes {
             name: axis.names[0].clone(),
             unit: in_letters(&axis.unit),
             at: axis.at.clone(),
+            sides: axis.sides,
         })
+    }
+
+    /// Whether places along two axes are even and in one unit, so that their lengths compare.
+    pub(crate) fn compare(&self, a: usize, b: usize) -> bool {
+        self.0[a].unit == self.0[b].unit && [a, b].into_iter().all(|axis| is_regular(&self.0[axis].at))
     }
 
     /// A place in voxels as the options accept it: `depth=120m`.
@@ -74,15 +82,21 @@ impl Axes {
 }
 
 impl Axis {
-    fn new(grid: &Grid, description: Option<&Description>, along: usize) -> Self {
+    fn new(grid: &Grid, of_grid: Option<&str>, description: Option<&Description>, along: usize) -> Self {
         let letter = ["x", "y", "z"][along].to_string();
         let own = description.and_then(|all| coordinates(all, along)).filter(|at| at.len() == grid.dims[along]);
-        let unit = if description.is_some_and(|all| is_counted(all, grid, along)) { grid.spacing[along] } else { 1.0 };
-        let regular = |n: usize| (grid.origin[along] + grid.spacing[along] * n as f64) / unit;
-        let (mut names, unit) = description.map_or_else(Default::default, |all| named(all, along));
+        let (mut names, mut unit) = description.map_or_else(Default::default, |all| named(all, along));
+        let is_counted = description.is_some_and(|all| is_counted(all, grid, along));
+        if own.is_none() && unit.is_empty() && !is_counted {
+            unit = of_grid.unwrap_or_default().into();
+        }
+        let one = if is_counted { grid.spacing[along] } else { 1.0 };
+        let regular = |n: usize| (grid.origin[along] + grid.spacing[along] * n as f64) / one;
         names.push(letter);
+        names.retain(|name| !name.is_empty());
         names.dedup();
-        Self { names, unit, at: own.unwrap_or_else(|| (0..grid.dims[along]).map(regular).collect()) }
+        let sides = description.and_then(|all| sides(all, along));
+        Self { names, unit, sides, at: own.unwrap_or_else(|| (0..grid.dims[along]).map(regular).collect()) }
     }
 
     fn voxel(&self, place: &AxisPosition) -> std::result::Result<f64, String> {
@@ -167,7 +181,17 @@ mod tests {
     use super::*;
 
     fn axis(at: &[f64]) -> Axis {
-        Axis { names: vec!["depth".into(), "z".into()], unit: "m".into(), at: at.to_vec() }
+        Axis { names: vec!["depth".into(), "z".into()], unit: "m".into(), at: at.to_vec(), sides: None }
+    }
+
+    #[test]
+    fn axes_of_a_grid_have_its_unit() {
+        let grid = Grid { spacing: [0.5, 2.0, 3.0], ..Grid::unit([3, 4, 5]) };
+        let axes = Axes::new(&grid, Some("mm"), None);
+        let titles = axes.labels().map(|axis| (axis.name, axis.unit, axis.at.last().copied()));
+        let expected = [("x", 1.0), ("y", 6.0), ("z", 12.0)].map(|(name, at)| (name.into(), "mm".into(), Some(at)));
+        assert_eq!(titles, expected);
+        assert!(axes.compare(0, 2) && Axes::new(&grid, None, None).labels()[0].unit.is_empty());
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::config::frames_of;
 use super::modes;
 use super::named_colours::colours_of_source;
 use super::units::values_of;
-use super::views::views;
+use super::views::{face_on, views};
 use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
@@ -68,7 +68,8 @@ impl Opened {
         }
         modes::check(request, false)?;
         let file = session.file(request.skip_damaged)?;
-        let exaggeration = exaggeration(request, &file.whole_grid(), reporter);
+        let axes = Axes::from_file(&file)?;
+        let exaggeration = exaggeration(request, &axes, &file.whole_grid(), reporter)?;
         let file = file.with_exaggeration(exaggeration);
         let lod = level_of_detail(request, &file)?;
         if request.lod == Detail::Auto {
@@ -79,7 +80,6 @@ impl Opened {
         let annotation = annotation(request, values_of(&file)?, time_labels(file.metadata()));
         let colours = modes::colours_of_file(request, &file)?;
         let scene = Box::new(CoefficientScene::new(file.clone(), request.method));
-        let axes = Axes::from_file(&file)?;
         let distributions = session.distributions(&file, request.skip_damaged);
         Ok(Self { scene, file: Some(file), distributions, exaggeration, annotation, colours, axes })
     }
@@ -99,12 +99,12 @@ impl Opened {
             None => None,
         };
         let grid = source.archive().grid;
-        let axes = Axes::new(&grid, source.archive().description.as_ref());
+        let axes = Axes::new(&grid, source.archive().units.space.as_deref(), source.archive().description.as_ref());
         let scene = match colours.clone().filter(|_| !modes::mode_name(request).colours_samples()) {
             Some(colours) => FrameScene::coloured(source, missing_value, colours),
             None => FrameScene::new(source, missing_value),
         };
-        let exaggeration = exaggeration(request, &grid, reporter);
+        let exaggeration = exaggeration(request, &axes, &grid, reporter)?;
         let scene = Box::new(scene.with_grid(grid.exaggerated(exaggeration)));
         let distributions = Distributions::default();
         Ok(Self { scene, file: None, distributions, exaggeration, annotation, colours, axes })
@@ -112,16 +112,33 @@ impl Opened {
 }
 
 /// The factor by which heights are drawn taller, with a note if it was chosen automatically.
-fn exaggeration(request: &PictureRequest, grid: &Grid, reporter: &dyn Reporter) -> f64 {
+fn exaggeration(request: &PictureRequest, axes: &Axes, grid: &Grid, reporter: &dyn Reporter) -> Result<f64> {
     if let Exaggeration::Factor(factor) = request.exaggerate {
-        return factor;
+        return Ok(factor);
+    }
+    if let Some(factor) = height_of_section(request, axes, grid)? {
+        return Ok(factor);
     }
     let factor = grid.sensible_exaggeration();
     if factor != 1.0 {
         let what = "as tall as they are, since the volume is nearly flat";
         reporter.note(format_args!("heights are drawn {factor} times {what}; `exaggerate` 1 draws them true"));
     }
-    factor
+    Ok(factor)
+}
+
+/// The factor by which the heights of a section are multiplied that is seen face-on and whose sides do not compare: depths in metres
+/// over degrees, or levels that are not even. Then the section has the usual shape of a chart.
+fn height_of_section(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<Option<f64>> {
+    /// The height as a share of the width.
+    const SHAPE: f64 = 0.6;
+    let [slice] = request.slice.as_slice() else { return Ok(None) };
+    let across = 1 - axes.find("slice", &slice.axis)?.min(1);
+    if axes.find("slice", &slice.axis)? == 2 || face_on(request, axes, grid)?.is_none() || axes.compare(across, 2) {
+        return Ok(None);
+    }
+    let extent = |axis: usize| grid.dims[axis] as f64 * grid.spacing[axis];
+    Ok(Some((SHAPE * extent(across) / extent(2) * 100.0).round() / 100.0).filter(|factor| *factor > 0.0))
 }
 
 /// Says which axes have voxels that are not drawn at their places.
