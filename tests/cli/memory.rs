@@ -87,7 +87,7 @@ fn pictures_take_what_they_plan() {
         ("--splat-error 0", 0.2),
         ("--mode composite", 0.6),
         ("--mode composite --error-image e.npy", 0.4),
-        ("--mode iso --iso 0.5 --error-image e.npy", 0.4),
+        ("--mode iso --iso 0.5 --error-image e.npy --frames 0:8 --size 300x300", 0.4),
         ("--mode mip", 0.6),
         ("--mode iso --iso 0.5", 0.6),
         ("--mode slice --slice z=0.5", 0.5),

@@ -76,8 +76,8 @@ pub struct Cli {
     /// World point in the middle of the picture [default: the volume's centre]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "View")]
     pub(super) center: Option<Triple>,
-    /// Draw heights this many times as tall: a number, or auto: more than 1 if the volume is nearly flat, with a note that
-    /// names the factor, or whatever gives a single section a good shape if its heights are in another unit or uneven
+    /// Draw heights this many times as tall: a number, or auto: more than 1 if the volume is nearly flat, and any for a single
+    /// section whose heights are uneven or in another unit; a note names it
     #[arg(long, value_name = "Z", default_value = "auto", help_heading = "View")]
     pub(super) exaggerate: Exaggeration,
     /// Render only these frames: ranges a:b:step or numbers, separated by commas

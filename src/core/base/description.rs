@@ -249,14 +249,17 @@ pub fn coordinates(description: &Description, along: usize) -> Option<Vec<f64>> 
     Some(at)
 }
 
-/// The sides of a patient that the first and the last voxel along an axis lie towards: L, R, A, P, S or I. `None` unless the source says so.
+/// The sides of a patient that the first and the last voxel along an axis lie towards: L, R, A, P, S or I. `None` unless the source says so, and
+/// for axes between two sides.
 pub fn sides(description: &Description, along: usize) -> Option<[char; 2]> {
-    let orientation = description.orientation.as_ref()?;
-    let mut voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some());
-    let place = voxels.position(|axis| axis.role.voxels() == Some(along))?;
-    let reversed = description.axes.iter().find(|axis| axis.role.voxels() == Some(along))?.reversed;
-    let direction = orientation.directions.get(place)?;
-    let main = (0..3).max_by(|a, b| direction[*a].abs().total_cmp(&direction[*b].abs()))?;
+    /// The least part of a direction along an axis of the world: 37 degrees from it.
+    const MAIN: f64 = 0.8;
+    let orientation = description.orientation.as_ref().filter(|_| !lacks_orientation(description))?;
+    let mut voxels = description.axes.iter().rev().filter(|axis| axis.role.voxels().is_some()).enumerate();
+    let (place, axis) = voxels.find(|(_, axis)| axis.role.voxels() == Some(along))?;
+    let (direction, reversed) = (orientation.directions.get(place)?, axis.reversed);
+    let length = direction.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let main = (0..3).find(|a| direction[*a].abs() >= MAIN * length && length > 0.0)?;
     let [low, high] = match orientation.space.split('-').nth(main)?.to_lowercase().as_str() {
         "right" => ['L', 'R'],
         "left" => ['R', 'L'],
@@ -268,6 +271,15 @@ pub fn sides(description: &Description, along: usize) -> Option<[char; 2]> {
     };
     let ascends = (orientation.spacing[place] * direction[main] > 0.0) != reversed;
     Some(if ascends { [low, high] } else { [high, low] })
+}
+
+/// Whether a NIfTI header has neither of its two transforms, so that the directions of its axes are made up.
+fn lacks_orientation(description: &Description) -> bool {
+    let header = description.attributes.iter().find(|attribute| attribute.name == NIFTI_HEADER);
+    let Some(Values::Numbers(numbers)) = header.map(|attribute| &attribute.value) else { return false };
+    let bytes = numbers.bytes();
+    let codes = if bytes.len() < 540 { 252..256 } else { 344..352 }; // of versions 1 and 2
+    bytes.get(codes).is_some_and(|codes| codes.iter().all(|byte| *byte == 0))
 }
 
 /// Whether coordinates are as far apart as each other, but for rounding to single precision.
@@ -346,6 +358,7 @@ mod tests {
         assert_eq!(text(all(&of(LPS, straight, true))), "LR PA IS");
         assert_eq!(text(all(&of("scanner-xyz", straight, false))), "  ");
         assert_eq!(text(all(&of(RAS, [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]], false))), "IS LR AP");
+        assert_eq!(text(all(&of(RAS, [[0.7, 0.7, 0.0], [0.0; 3], [f64::NAN; 3]], false))), "  ");
     }
 
     #[test]

@@ -272,7 +272,8 @@ impl Sum<'_> {
         let mut annotation = annotation(request, setup.values.clone(), total.time_labels());
         let provenance = provenance(request, &setup.grid, &config, None, &annotation.times, &colouring);
         let provenance = with_parts(provenance, total);
-        annotation.axes = Some(axes_of_region(setup.axes.clone(), &setup.whole, whole_voxels(total), &config));
+        annotation.axes =
+            Some(axes_of_region(setup.axes.clone(), &setup.whole, whole_voxels(total), &config, setup.exaggeration));
         note_scale(&annotation, reporter);
         note_title(request, &annotation, &config, reporter);
         let (targets, annotation) = (&targets, &annotation);

@@ -9,7 +9,7 @@ use super::reporter::Caller;
 use super::request::{PictureRequest, option};
 use super::series::series_csv;
 use super::session::Session;
-use super::values::{AxisPosition, PointSpec};
+use super::values::{AxisPosition, PointSpec, ViewAngles};
 use super::view_request::ViewRequest;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -118,7 +118,9 @@ impl ViewerSession {
     }
 
     fn known(&self) -> Result<Facts> {
-        let Opened { scene, file, annotation, axes, .. } = Opened::new(&self.session, &self.base, &Caller(&Silent))?;
+        // The page gives a view with every request: a section is not stretched as it would be face-on.
+        let base = PictureRequest { view: vec![ViewAngles([0.0; 2])], ..self.base.clone() };
+        let Opened { scene, file, annotation, axes, .. } = Opened::new(&self.session, &base, &Caller(&Silent))?;
         let grid = file.as_ref().map_or(*scene.grid(), |file| file.whole_grid());
         let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;

@@ -3,7 +3,7 @@
 use super::canvas::Canvas;
 use super::text::Letters;
 use super::ticks::{all_round_values, roundest, texts};
-use super::volume::{THIN, VolumeAxes, text};
+use super::volume::{AxisLabels, THIN, VolumeAxes, text};
 use wavesplat_core::view::camera::Camera;
 
 /// An edge of the box in a picture.
@@ -26,6 +26,8 @@ impl Edge {
 const MOST_TICKS: usize = 7;
 /// The same of uneven axes, where single values say less.
 const MOST_UNEVEN: usize = 10;
+/// The most values of one step that are tried on uneven axes.
+const MOST_TRIED: usize = 40;
 
 /// A value beside an edge.
 #[derive(Debug, Clone)]
@@ -46,7 +48,7 @@ impl Tick {
     }
 }
 
-/// Drops each tick that touches the one kept before it: on uneven axes, texts may touch whatever the step is.
+/// Drops each tick that touches the one kept before it: on slightly uneven axes, texts may touch whatever the step is.
 fn thinned(ticks: Vec<Tick>) -> Vec<Tick> {
     ticks.into_iter().fold(Vec::new(), |mut kept: Vec<Tick>, tick| {
         if kept.last().is_none_or(|last| !last.touches(&tick)) {
@@ -158,10 +160,19 @@ impl VolumeAxes {
         let _ = names.into_iter().chain(shorter).any(|name| put(&name));
     }
 
+    /// The coordinates of the voxels that are drawn.
+    fn drawn(&self, axis: usize) -> AxisLabels {
+        let AxisLabels { name, unit, at, sides } = &self.labels[axis];
+        let region = self.region.start[axis]..self.region.end[axis];
+        let counted = || region.clone().map(|voxel| voxel as f64).collect();
+        let at = at.get(region.clone()).map_or_else(counted, <[f64]>::to_vec);
+        AxisLabels { name: name.clone(), unit: unit.clone(), at, sides: *sides }
+    }
+
     /// Says if an axis is not drawn in proportion.
     fn note(&self, axis: usize) -> String {
         match axis {
-            axis if self.labels[axis].is_uneven() => ", unevenly spaced".into(),
+            axis if self.drawn(axis).is_uneven() => ", unevenly spaced".into(),
             2 if self.exaggeration != 1.0 => format!(", {} times as tall", text(self.exaggeration)),
             _ => String::new(),
         }
@@ -169,10 +180,14 @@ impl VolumeAxes {
 
     /// The values along an edge: as many as fit up to [`MOST_TICKS`], or none, since one alone tells no scale.
     fn ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
-        let [first, last] = self.ends(edge.axis).map(|voxel| self.labels[edge.axis].coordinate(voxel));
-        if self.labels[edge.axis].is_uneven() {
-            return self.uneven_ticks(edge, letters, rim);
+        let drawn = self.drawn(edge.axis);
+        match drawn.at.as_slice() {
+            [only] => return self.placed(&[*only], edge, letters, rim),
+            _ if !drawn.is_monotone() => return Vec::new(),
+            _ if drawn.is_uneven() => return self.uneven_ticks(edge, letters, rim),
+            _ => {}
         }
+        let [first, last] = [0, drawn.at.len()].map(|voxel| drawn.coordinate(voxel as f64 - 0.5));
         let all = all_round_values(first.min(last), first.max(last), MOST_TICKS);
         let mut all: Vec<Vec<Tick>> = all.map(|values| self.placed(&values, edge, letters, rim)).collect();
         if all.first().is_some_and(|ticks| ticks.len() == MOST_TICKS) && all.get(1).is_some_and(|next| next.len() > 3) {
@@ -186,9 +201,10 @@ impl VolumeAxes {
     /// The values along an edge of an uneven axis: the roundest ones that do not touch.
     fn uneven_ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
         // Half a voxel beyond the ends means little where voxels are unlike.
-        let region = [self.region.start[edge.axis], self.region.end[edge.axis] - 1];
-        let [first, last] = region.map(|voxel| self.labels[edge.axis].coordinate(voxel as f64));
-        let values = roundest(first.min(last), first.max(last));
+        let drawn = self.drawn(edge.axis).at;
+        let (least, most) = drawn.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let finer: Vec<Vec<f64>> = all_round_values(least, most, MOST_TRIED).collect();
+        let values: Vec<f64> = roundest(least, most).into_iter().chain(finer.into_iter().rev().flatten()).collect();
         let mut kept: Vec<Tick> = Vec::new();
         for tick in values.iter().flat_map(|value| self.placed(&[*value], edge, letters, rim)) {
             if kept.len() < MOST_UNEVEN && kept.iter().all(|other| !other.touches(&tick)) {
@@ -201,15 +217,16 @@ impl VolumeAxes {
 
     /// Values at their places beside an edge.
     fn placed(&self, values: &[f64], edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
-        let ([first, last], labels, size) = (self.ends(edge.axis), &self.labels[edge.axis], letters.size);
+        let (drawn, size) = (self.drawn(edge.axis), letters.size);
         let tick = |(text, value): (String, &f64)| {
-            let share = (labels.voxel(*value) - first) / (last - first);
+            let share = (drawn.voxel(*value) + 0.5) / drawn.at.len() as f64;
             let half = [letters.width(&text) / 2.0, size / 2.0];
             let away = rim + 0.6 * size + reach(edge.out, half);
             Tick { text, share, middle: moved(point(edge.from, edge.to, share), edge.out, away), half }
         };
         let within = |tick: &Tick| (-1e-9..=1.0 + 1e-9).contains(&tick.share);
-        texts(values).into_iter().zip(values).map(tick).filter(within).collect()
+        let shown: Vec<f64> = values.iter().map(|value| drawn.shown(*value)).collect();
+        texts(&shown).into_iter().zip(values).map(tick).filter(within).collect()
     }
 }
 
@@ -243,9 +260,8 @@ fn reach(direction: [f64; 2], half: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::layout::{BAR, Margins, Parts, margins};
-    use super::super::volume::AxisLabels;
     use super::*;
-    use wavesplat_core::base::grid::Grid;
+    use wavesplat_core::base::grid::{Grid, Region};
     use wavesplat_core::view::camera::View;
 
     fn axes(grid: Grid) -> VolumeAxes {
@@ -393,6 +409,36 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn uneven_axes_have_values_wherever_they_lie() {
+        let [ocean, ..] = &described()[..] else { unreachable!() };
+        for (first, last) in
+            [(41.2, 48.7), (1020.0, 1028.5), (-74.9, -70.5), (2000.0, 2010.0), (1e6, 1.3e6), (3e-7, 4e-7)]
+        {
+            let mut volume = ocean.clone();
+            let share = |n: usize| (n as f64 / 11.0).powi(2);
+            volume.labels[2].at = (0..12).map(|n| first + share(n) * (last - first)).collect();
+            let ticks = beside(&volume, 2, 400.0);
+            assert!(ticks.len() > 3, "{first} to {last}: {ticks:?}");
+        }
+    }
+
+    #[test]
+    fn only_the_voxels_that_are_drawn_count() {
+        let [ocean, ..] = &described()[..] else { unreachable!() };
+        let mut volume = ocean.clone();
+        volume.labels[2].at =
+            [0.0, 3.0, 10.0].into_iter().chain((1..=9).map(|n| 1000.0 + 100.0 * f64::from(n))).collect();
+        volume.region.start[2] = 3;
+        assert!(volume.note(2).is_empty() && beside(&volume, 2, 400.0).len() > 3);
+        volume.region = Region { start: [0, 0, 4], end: [40, 30, 5] };
+        let one = beside(&volume, 2, 100.0);
+        assert!(one.len() == 1 && one[0].text == "1200" && (one[0].share - 0.5).abs() < 1e-9, "{one:?}");
+        volume.region = volume.grid.whole();
+        volume.labels[2].at[5] = -4.0;
+        assert!(beside(&volume, 2, 400.0).is_empty(), "coordinates that turn back have no scale");
     }
 
     #[test]

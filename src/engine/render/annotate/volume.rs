@@ -1,4 +1,4 @@
-//! The box of the volume, and values along its edges.
+//! The box of the volume, its axes, a scale, and arrows along x, y and z.
 
 use super::canvas::{Canvas, line};
 use super::layout::BAR;
@@ -131,9 +131,31 @@ impl AxisLabels {
     }
 
     /// Whether steps differ so much that no even scale would be true.
-    pub(super) fn is_uneven(&self) -> bool {
+    pub fn is_uneven(&self) -> bool {
         let steps = || self.at.windows(2).map(|pair| (pair[1] - pair[0]).abs());
         steps().fold(0.0, f64::max) > UNEVEN * steps().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether coordinates only ascend, or only descend.
+    pub(super) fn is_monotone(&self) -> bool {
+        let ascends = |pair: &[f64]| pair[0] < pair[1];
+        self.at.windows(2).all(ascends) || self.at.windows(2).all(|pair| ascends(&[pair[1], pair[0]]))
+    }
+
+    /// Whether lengths along two axes compare: both are even, and in units of length, in degrees, or in the same unit.
+    pub fn compares_with(&self, other: &Self) -> bool {
+        const LENGTHS: [&str; 11] =
+            ["m", "metre", "metres", "meter", "meters", "km", "kilometers", "cm", "mm", "um", "µm"];
+        let both = |is: &dyn Fn(&str) -> bool| is(&self.unit) && is(&other.unit);
+        let is_same = self.unit == other.unit
+            || both(&|unit| LENGTHS.contains(&unit))
+            || both(&|unit| unit.starts_with('°') || unit.starts_with("degree"));
+        is_same && !self.is_uneven() && !other.is_uneven()
+    }
+
+    /// A coordinate as it is written: longitudes of a whole turn and more begin at 0 again.
+    pub(super) fn shown(&self, coordinate: f64) -> f64 {
+        if self.unit == "°E" && coordinate >= 360.0 { coordinate - 360.0 } else { coordinate }
     }
 
     /// The name and the unit.

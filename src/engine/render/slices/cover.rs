@@ -233,7 +233,8 @@ pub(super) fn share(number: f32, width: f32) -> f32 {
     if share.is_nan() { 1.0 } else { share.clamp(0.0, 1.0) }
 }
 
-fn length([b, c]: [f32; 2]) -> f32 {
+/// Not by the system's `hypot`, which may differ from machine to machine.
+pub(super) fn length([b, c]: [f32; 2]) -> f32 {
     (b * b + c * c).sqrt()
 }
 

@@ -1,7 +1,7 @@
 //! Bounds of how much of its cell a surface covers (eq 43), if the field is known up to an error: [`Rays::meeting`] for all fields
 //! within the errors.
 
-use super::cover::{CoverPoint, FAR, Rays, opacity_of_second, share};
+use super::cover::{CoverPoint, FAR, Rays, length, opacity_of_second, share};
 
 /// The numbers from `least` to `most`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -195,7 +195,7 @@ impl Step<'_> {
         });
         let of_ray = self.from.rise_error.max(self.to.rise_error) + half * (self.to.rise - self.from.rise).abs();
         let rise = Interval::around(self.rays.rise(&gradient), of_ray);
-        let across = Interval::size(gradient[0].hypot(gradient[1]), off[0].hypot(off[1]));
+        let across = Interval::size(length([gradient[0], gradient[1]]), length([off[0], off[1]]));
         Change { gradient, off, rise, across }
     }
 
@@ -301,11 +301,11 @@ impl Step<'_> {
     /// How far the movement of a point of a surface from cell to cell may be off.
     fn moved_off(&self, axis: usize, off: &[f32; 3]) -> f32 {
         let ([b, c, a], [along_b, along_c, _]) = (*off, self.rays.direction.map(f32::abs));
-        match axis {
-            0 => (along_c * c + a).hypot(along_b * c),
-            1 => (along_c * b).hypot(along_b * b + a),
-            _ => b.hypot(c),
-        }
+        length(match axis {
+            0 => [along_c * c + a, along_b * c],
+            1 => [along_c * b, along_b * b + a],
+            _ => [b, c],
+        })
     }
 }
 

@@ -247,7 +247,8 @@ impl Bounded {
             let at = |opacity: f32, light: f32| f64::from(opacity) * (f64::from(light) - behind) - term;
             let [dark, bright] = if c < 3 { [run.dark[c], run.bright[c]] } else { [0.0; 2] };
             let ends = [at(least, dark), at(least, bright), at(most, dark), at(most, bright)];
-            let off = ends.into_iter().map(f64::abs).fold(0.0, f64::max) as f32;
+            let off =
+                ends.into_iter().fold(0.0, |most, end: f64| if end.abs() <= most { most } else { end.abs() }) as f32;
             if off > 0.0 || most > 0.0 {
                 self.errors[i][c] += self.through[i] * (off + OF_THROUGH) + OF_SUM;
             }

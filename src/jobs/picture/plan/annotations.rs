@@ -55,8 +55,7 @@ pub(in crate::picture) fn volume_axes(
     exaggeration: f64,
 ) -> Result<VolumeAxes> {
     let region = request.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
-    let exaggeration = if axes.compare(0, 2) && axes.compare(1, 2) { exaggeration } else { 1.0 };
-    Ok(VolumeAxes { exaggeration, ..axes_of_region(axes.labels(), whole, region, config) })
+    Ok(axes_of_region(axes.labels(), whole, region, config, exaggeration))
 }
 
 /// The axes of the voxels that are drawn.
@@ -65,10 +64,12 @@ pub(in crate::picture) fn axes_of_region(
     whole: &Grid,
     region: Region,
     config: &RenderConfig,
+    exaggeration: f64,
 ) -> VolumeAxes {
     let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. });
     let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
-    VolumeAxes { grid: *whole, region, rim, exaggeration: 1.0, labels }
+    let compares = labels[..2].iter().any(|across| across.compares_with(&labels[2]));
+    VolumeAxes { grid: *whole, region, rim, exaggeration: if compares { exaggeration } else { 1.0 }, labels }
 }
 
 /// Says if a scale that is asked for cannot be drawn.

@@ -2,7 +2,7 @@
 
 use super::units::{attribute_text, in_letters};
 use crate::picture::values::AxisPosition;
-use wavesplat_core::base::description::{Description, coordinates, is_regular, sides};
+use wavesplat_core::base::description::{Description, coordinates, sides};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
 use wavesplat_engine::file::{CoefficientFile, setting};
@@ -69,9 +69,15 @@ impl Axes {
         })
     }
 
-    /// Whether places along two axes are even and in one unit, so that their lengths compare.
+    /// Whether lengths along two axes compare.
     pub(crate) fn compare(&self, a: usize, b: usize) -> bool {
-        self.0[a].unit == self.0[b].unit && [a, b].into_iter().all(|axis| is_regular(&self.0[axis].at))
+        let labels = self.labels();
+        labels[a].compares_with(&labels[b])
+    }
+
+    /// The name of an axis.
+    pub(crate) fn name(&self, axis: usize) -> &str {
+        &self.0[axis].names[0]
     }
 
     /// A place in voxels as the options accept it: `depth=120m`.
@@ -96,7 +102,11 @@ impl Axis {
         names.retain(|name| !name.is_empty());
         names.dedup();
         let sides = description.and_then(|all| sides(all, along));
-        Self { names, unit, sides, at: own.unwrap_or_else(|| (0..grid.dims[along]).map(regular).collect()) }
+        let mut at = own.unwrap_or_else(|| (0..grid.dims[along]).map(regular).collect());
+        if unit.starts_with("degree") {
+            unwrap_degrees(&mut at);
+        }
+        Self { names, unit, at, sides }
     }
 
     fn voxel(&self, place: &AxisPosition) -> std::result::Result<f64, String> {
@@ -131,6 +141,9 @@ impl Axis {
             return Err(format!("the coordinates of the axis {name} do not ascend; take a voxel like #0"));
         }
         let (first, last) = (self.at[0], self.at[self.at.len() - 1]);
+        let turns = if self.unit.starts_with("degree") { [0.0, 360.0, -360.0] } else { [0.0; 3] };
+        let within = |at: &f64| (first.min(last)..=first.max(last)).contains(at);
+        let at = turns.into_iter().map(|turn| at + turn).find(within).unwrap_or(at);
         if !(first.min(last)..=first.max(last)).contains(&at) {
             let range = format!("{} to {} {}", first.min(last), first.max(last), self.unit);
             return Err(format!("{at} is beyond the axis {name}, which has {}", range.trim_end()));
@@ -148,6 +161,15 @@ impl Axis {
         let high = (low + 1).min(self.at.len() - 1);
         let share = voxel - low as f64;
         if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
+    }
+}
+
+/// Adds whole turns where longitudes jump back by most of one, as the grid has them.
+fn unwrap_degrees(at: &mut [f64]) {
+    for i in 1..at.len() {
+        if at[i] < at[i - 1] - 180.0 {
+            at[i..].iter_mut().for_each(|v| *v += 360.0);
+        }
     }
 }
 
@@ -205,6 +227,13 @@ mod tests {
         assert!(["50.5", "depth", "0 to 50 m"].iter().all(|word| beyond.contains(word)), "{beyond}");
         assert!(axis(&[0.0, 2.0, 1.0]).index(1.0).is_err());
         assert_eq!(axis(&[3.0]).index(3.0), Ok(0.0));
+        let mut lon = axis(&[350.0, 355.0, 0.0, 5.0]);
+        unwrap_degrees(&mut lon.at);
+        lon.unit = "degrees_east".into();
+        for (at, voxel) in [(350.0, 0.0), (-5.0, 1.0), (2.5, 2.5), (362.5, 2.5)] {
+            assert_eq!(lon.index(at), Ok(voxel));
+        }
+        assert!(lon.index(10.0).is_err() && lon.at[3] == 365.0);
         assert!(up.check_unit("metres").is_ok() && up.check_unit("km").is_err());
     }
 }

@@ -117,6 +117,10 @@ fn exaggeration(request: &PictureRequest, axes: &Axes, grid: &Grid, reporter: &d
         return Ok(factor);
     }
     if let Some(factor) = height_of_section(request, axes, grid)? {
+        let (height, across) = (axes.name(2), axes.name(section_across(request, axes)?));
+        reporter.note(format_args!(
+            "the section is drawn 0.6 times as high as wide, since {height} does not compare with {across}; `exaggerate` sets another height"
+        ));
         return Ok(factor);
     }
     let factor = grid.sensible_exaggeration();
@@ -132,13 +136,25 @@ fn exaggeration(request: &PictureRequest, axes: &Axes, grid: &Grid, reporter: &d
 fn height_of_section(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<Option<f64>> {
     /// The height as a share of the width.
     const SHAPE: f64 = 0.6;
-    let [slice] = request.slice.as_slice() else { return Ok(None) };
-    let across = 1 - axes.find("slice", &slice.axis)?.min(1);
-    if axes.find("slice", &slice.axis)? == 2 || face_on(request, axes, grid)?.is_none() || axes.compare(across, 2) {
+    let is_placed = request.scale.is_some() || request.center.is_some();
+    if is_placed || grid.dims[2] == 1 || face_on(request, axes, grid)?.is_none() {
         return Ok(None);
     }
+    let across = section_across(request, axes)?;
     let extent = |axis: usize| grid.dims[axis] as f64 * grid.spacing[axis];
-    Ok(Some((SHAPE * extent(across) / extent(2) * 100.0).round() / 100.0).filter(|factor| *factor > 0.0))
+    let factor = SHAPE * extent(across) / extent(2);
+    let factor = format!("{factor:.2e}").parse().unwrap_or(factor); // three digits
+    Ok(Some(factor).filter(|factor: &f64| across < 2 && !axes.compare(across, 2) && factor.is_normal()))
+}
+
+/// The axis to the right in a section seen face-on; 2 if it has no heights.
+fn section_across(request: &PictureRequest, axes: &Axes) -> Result<usize> {
+    let cut = request.slice.first().map(|slice| axes.find("slice", &slice.axis)).transpose()?;
+    Ok(match cut {
+        Some(0) => 1,
+        Some(1) => 0,
+        _ => 2,
+    })
 }
 
 /// Says which axes have voxels that are not drawn at their places.
