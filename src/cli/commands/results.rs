@@ -1,31 +1,6 @@
 //! The errors of what is computed from a file's samples, in words.
 
-use crate::{CommonArgs, FrameRange, InputArgs, narrow, remembered};
-use std::path::PathBuf;
-use wavesplat_core::base::error::Result;
-use wavesplat_core::source::FrameSource;
 use wavesplat_engine::convert::estimate::EstimatedErrors;
-use wavesplat_engine::file::CoefficientFile;
-use wavesplat_engine::file::shard::frames_of_shard;
-
-/// The frames that a file was converted from.
-pub(super) fn source_of(
-    file: &CoefficientFile,
-    input: &InputArgs,
-    inputs: &[PathBuf],
-    frames: Option<FrameRange>,
-    common: &CommonArgs,
-) -> Result<Box<dyn FrameSource>> {
-    let source = input.open_again(file, inputs, frames, common)?;
-    // Appended frames may come from the same archive: then all its frames count, not those converted first.
-    if frames.is_some() || source.archive().frames == Some(file.frames()) {
-        return Ok(source);
-    }
-    let source = narrow(source, remembered(file, "frames")?, None)?;
-    let shard =
-        frames_of_shard(file).filter(|(_, all)| source.archive().frames.map(|frames| frames as u64) == Some(*all));
-    narrow(source, shard.map(|(frames, _)| frames.into()), None)
-}
 
 /// The errors in a line.
 pub(super) fn results_text(errors: &EstimatedErrors, sides: &[f64], unit: Option<&str>) -> String {

@@ -1,7 +1,7 @@
 //! `wavesplat verify`
 
-use super::results::{results_text, source_of};
-use crate::{CommonArgs, FrameRange, InputArgs, RemoteArgs, print};
+use super::results::results_text;
+use crate::{CommonArgs, FrameRange, InputArgs, RemoteArgs, narrow, print, remembered};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -9,7 +9,9 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::source::FrameSource;
 use wavesplat_engine::convert::errors_of_results;
 use wavesplat_engine::convert::estimate::EstimatedErrors;
+use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::report::{BoundReport, largest_bound};
+use wavesplat_engine::file::shard::frames_of_shard;
 use wavesplat_engine::file::verify::{BlockPlace, Comparison, MOST_NAMED, VerifyReport, verify};
 use wavesplat_format::Keep;
 
@@ -60,10 +62,7 @@ struct Reported<'a> {
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     args.common.start()?;
     let file = args.remote.open(&args.file, args.input.access())?;
-    let mut source = match args.against.as_slice() {
-        [] => None,
-        inputs => Some(source_of(&file, &args.input, inputs, args.frames, &args.common)?),
-    };
+    let mut source = args.source(&file)?;
     let compared: Option<&mut dyn FrameSource> = match &mut source {
         Some(source) => Some(source.as_mut()),
         None => None,
@@ -113,6 +112,24 @@ fn missed(c: &Comparison) -> Option<String> {
     Some(format!(
         "blocks with errors above those stated in the file: {blocks}, the first is block {block} of window {window}{channel}"
     ))
+}
+
+impl VerifyArgs {
+    fn source(&self, file: &CoefficientFile) -> Result<Option<Box<dyn FrameSource>>> {
+        if self.against.is_empty() {
+            return Ok(None);
+        }
+        let source = self.input.open_again(file, &self.against, self.frames, &self.common)?;
+        // Appended frames may come from the same archive: then all its frames count, not those converted first.
+        let is_all = self.frames.is_some() || source.archive().frames == Some(file.frames());
+        if is_all {
+            return Ok(Some(source));
+        }
+        let source = narrow(source, remembered(file, "frames")?, None)?;
+        let shard =
+            frames_of_shard(file).filter(|(_, all)| source.archive().frames.map(|frames| frames as u64) == Some(*all));
+        narrow(source, shard.map(|(frames, _)| frames.into()), None).map(Some)
+    }
 }
 
 fn places(count: u64) -> String {

@@ -115,8 +115,8 @@ pub struct Cli {
     #[arg(long, value_parser = choice::<Limit>(), default_value = "certified", help_heading = "Error")]
     pub(super) error: Limit,
     /// Also write pictures of the certified error: an upper bound, per pixel, on the difference from a picture of the
-    /// original samples drawn with the uncut kernel; for a composite or surfaces, on that of light and opacity from the same drawing of them (a file
-    /// or pattern like -o; .npy in units of the picture, colours from 0 to the largest error of small pictures)
+    /// original samples drawn with the uncut kernel; for a composite or surfaces, on that of light and opacity from the
+    /// same drawing of them (a file or pattern like -o; .npy in units of the picture, colours from 0 to the largest error of small pictures)
     #[arg(long, value_name = "OUT", help_heading = "Error")]
     pub(super) error_image: Option<PathBuf>,
     /// Quantity that a pixel shows

@@ -282,6 +282,15 @@ fn lacks_orientation(description: &Description) -> bool {
     bytes.get(codes).is_some_and(|codes| codes.iter().all(|byte| *byte == 0))
 }
 
+/// Adds whole turns where longitudes jump back by most of one.
+pub fn unwrap_degrees(at: &mut [f64]) {
+    for i in 1..at.len() {
+        if at[i] < at[i - 1] - 180.0 {
+            at[i..].iter_mut().for_each(|v| *v += 360.0);
+        }
+    }
+}
+
 /// Whether coordinates are as far apart as each other, but for rounding to single precision.
 pub fn is_regular(at: &[f64]) -> bool {
     let [first, .., last] = at else { return true };

@@ -7,7 +7,7 @@ use wavesplat_core::base::memory::FIXED;
 use wavesplat_core::codec::derived::{Computed, DerivedErrors};
 use wavesplat_core::source::{FrameSource, FrameWindow, read_frames};
 
-/// The most windows of which blocks are compared, and the most blocks of each.
+/// Blocks are compared in at most so many windows, and at most so many in each.
 const WINDOWS: usize = 3;
 const BLOCKS: usize = 8;
 

@@ -3,7 +3,7 @@
 use super::auxiliary_times::{self, Auxiliary};
 use super::sibling_times::StepArrays;
 use super::{ArrayFile, FileArrays, Variable, axes, coordinates};
-use wavesplat_core::base::description::AxisRole;
+use wavesplat_core::base::description::{AxisRole, unwrap_degrees};
 use wavesplat_core::base::error::{Note, Remedy};
 use wavesplat_core::source::layout::Axis;
 
@@ -201,15 +201,6 @@ impl AxisCoordinates {
             self.name, self.unit, leading.name, leading.unit, leading.name
         );
         Note::with(text, Remedy::Set("spacing"))
-    }
-}
-
-/// Adds whole turns where longitudes jump back by most of one.
-fn unwrap_degrees(at: &mut [f64]) {
-    for i in 1..at.len() {
-        if at[i] < at[i - 1] - 180.0 {
-            at[i..].iter_mut().for_each(|v| *v += 360.0);
-        }
     }
 }
 

@@ -182,14 +182,14 @@ impl VolumeAxes {
     fn ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
         let drawn = self.drawn(edge.axis);
         match drawn.at.as_slice() {
-            [only] => return self.placed(&[*only], edge, letters, rim),
+            [only] => return placed(&drawn, &[*only], edge, letters, rim),
             _ if !drawn.is_monotone() => return Vec::new(),
-            _ if drawn.is_uneven() => return self.uneven_ticks(edge, letters, rim),
+            _ if drawn.is_uneven() => return uneven_ticks(&drawn, edge, letters, rim),
             _ => {}
         }
         let [first, last] = [0, drawn.at.len()].map(|voxel| drawn.coordinate(voxel as f64 - 0.5));
         let all = all_round_values(first.min(last), first.max(last), MOST_TICKS);
-        let mut all: Vec<Vec<Tick>> = all.map(|values| self.placed(&values, edge, letters, rim)).collect();
+        let mut all: Vec<Vec<Tick>> = all.map(|values| placed(&drawn, &values, edge, letters, rim)).collect();
         if all.first().is_some_and(|ticks| ticks.len() == MOST_TICKS) && all.get(1).is_some_and(|next| next.len() > 3) {
             all.remove(0);
         }
@@ -197,37 +197,36 @@ impl VolumeAxes {
         let found = all.iter().find(fits).cloned().or_else(|| all.into_iter().next().map(thinned));
         found.filter(|ticks| ticks.len() > 1).unwrap_or_default()
     }
+}
 
-    /// The values along an edge of an uneven axis: the roundest ones that do not touch.
-    fn uneven_ticks(&self, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
-        // Half a voxel beyond the ends means little where voxels are unlike.
-        let drawn = self.drawn(edge.axis).at;
-        let (least, most) = drawn.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-        let finer: Vec<Vec<f64>> = all_round_values(least, most, MOST_TRIED).collect();
-        let values: Vec<f64> = roundest(least, most).into_iter().chain(finer.into_iter().rev().flatten()).collect();
-        let mut kept: Vec<Tick> = Vec::new();
-        for tick in values.iter().flat_map(|value| self.placed(&[*value], edge, letters, rim)) {
-            if kept.len() < MOST_UNEVEN && kept.iter().all(|other| !other.touches(&tick)) {
-                kept.push(tick);
-            }
+/// The values along an edge of an uneven axis: the roundest ones that do not touch.
+fn uneven_ticks(drawn: &AxisLabels, edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
+    // Half a voxel beyond the ends means little where voxels are unlike.
+    let (least, most) = drawn.at.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let finer: Vec<Vec<f64>> = all_round_values(least, most, MOST_TRIED).collect();
+    let values: Vec<f64> = roundest(least, most).into_iter().chain(finer.into_iter().rev().flatten()).collect();
+    let mut kept: Vec<Tick> = Vec::new();
+    for tick in values.iter().flat_map(|value| placed(drawn, &[*value], edge, letters, rim)) {
+        if kept.len() < MOST_UNEVEN && kept.iter().all(|other| !other.touches(&tick)) {
+            kept.push(tick);
         }
-        kept.sort_by(|a, b| a.share.total_cmp(&b.share));
-        if kept.len() > 1 { kept } else { Vec::new() }
     }
+    kept.sort_by(|a, b| a.share.total_cmp(&b.share));
+    if kept.len() > 1 { kept } else { Vec::new() }
+}
 
-    /// Values at their places beside an edge.
-    fn placed(&self, values: &[f64], edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
-        let (drawn, size) = (self.drawn(edge.axis), letters.size);
-        let tick = |(text, value): (String, &f64)| {
-            let share = (drawn.voxel(*value) + 0.5) / drawn.at.len() as f64;
-            let half = [letters.width(&text) / 2.0, size / 2.0];
-            let away = rim + 0.6 * size + reach(edge.out, half);
-            Tick { text, share, middle: moved(point(edge.from, edge.to, share), edge.out, away), half }
-        };
-        let within = |tick: &Tick| (-1e-9..=1.0 + 1e-9).contains(&tick.share);
-        let shown: Vec<f64> = values.iter().map(|value| drawn.shown(*value)).collect();
-        texts(&shown).into_iter().zip(values).map(tick).filter(within).collect()
-    }
+/// Values at their places beside an edge.
+fn placed(drawn: &AxisLabels, values: &[f64], edge: &Edge, letters: &Letters, rim: f64) -> Vec<Tick> {
+    let size = letters.size;
+    let tick = |(text, value): (String, &f64)| {
+        let share = (drawn.voxel(*value) + 0.5) / drawn.at.len() as f64;
+        let half = [letters.width(&text) / 2.0, size / 2.0];
+        let away = rim + 0.6 * size + reach(edge.out, half);
+        Tick { text, share, middle: moved(point(edge.from, edge.to, share), edge.out, away), half }
+    };
+    let within = |tick: &Tick| (-1e-9..=1.0 + 1e-9).contains(&tick.share);
+    let shown: Vec<f64> = values.iter().map(|value| drawn.shown(*value)).collect();
+    texts(&shown).into_iter().zip(values).map(tick).filter(within).collect()
 }
 
 /// The length of a vector. The system's `hypot` may differ from machine to machine.

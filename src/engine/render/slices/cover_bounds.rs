@@ -143,7 +143,7 @@ impl Step<'_> {
         let (change, bend) = (self.change(share), self.bend());
         let behind = self.turns_behind(&change);
         let height = self.height_of_passed(value, behind);
-        let (covered, within) = (self.of_height(height, &change), self.within(share, &change, bend));
+        let (covered, within) = (self.shares(height, change.across), self.within(share, &change, bend));
         let all = Interval { least: covered.least * within.least, most: covered.most * within.most };
         let (first, second) = (all.map(|x| x * of_surface), all.map(|x| opacity_of_second(x * of_surface, of_surface)));
         let opacity = match (behind, covered.least >= 1.0, covered.most < 1.0) {
@@ -158,8 +158,7 @@ impl Step<'_> {
         if self.is_towards(value) == Some(false) {
             return None;
         }
-        let size = |place: &Place| Interval::size(place.rise, place.rise_error);
-        let share = size(self.from).share_of(size(self.to));
+        let share = self.turning_share();
         let over = self.turning_value(share);
         let over = Interval { least: over.least - value, most: over.most - value };
         let under = Interval { least: -over.most, most: -over.least };
@@ -169,7 +168,7 @@ impl Step<'_> {
             None => over.hull(under),
         };
         let change = self.change(share);
-        let (covered, within) = (self.of_height(height, &change), self.within(share, &change, self.bend()));
+        let (covered, within) = (self.shares(height, change.across), self.within(share, &change, self.bend()));
         let both = |x: f32| x * of_surface * (2.0 - of_surface);
         let opacity = Interval { least: 0.0, most: both(covered.most * within.most) };
         Some(Shown { opacity, share })
@@ -209,8 +208,7 @@ impl Step<'_> {
     /// How far the ray goes beyond a surface that it passes.
     fn height_of_passed(&self, value: f32, behind: Option<bool>) -> Interval {
         let turned = || {
-            let size = |place: &Place| Interval::size(place.rise, place.rise_error);
-            let turn = self.turning_value(size(self.from).share_of(size(self.to)));
+            let turn = self.turning_value(self.turning_share());
             Interval::size(turn.middle() - value, turn.half())
         };
         let beyond = |place: &Place| {
@@ -235,6 +233,12 @@ impl Step<'_> {
         }
     }
 
+    /// Where the ray turns back, as a share of the way.
+    fn turning_share(&self) -> Interval {
+        let steep = |place: &Place| Interval::size(place.rise, place.rise_error);
+        steep(self.from).share_of(steep(self.to))
+    }
+
     /// The value where the ray turns back, by a cubic (as in [`Rays::meeting`]).
     fn turning_value(&self, share: Interval) -> Interval {
         let [from, to] = [self.from, self.to];
@@ -248,10 +252,6 @@ impl Step<'_> {
         let steep = steep + 1.5 * (from.error + to.error) + length * of_rises;
         let off = from.error.max(to.error) + length * of_rises * (4.0 / 27.0) + steep * share.half();
         Interval::around(middle, off)
-    }
-
-    fn of_height(&self, height: Interval, change: &Change) -> Interval {
-        self.shares(height, change.across)
     }
 
     /// The shares of a cell for numbers that change by a length from cell to cell.

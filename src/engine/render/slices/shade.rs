@@ -71,7 +71,7 @@ impl Shader {
     pub(super) fn doubt(&self, gradient: [f32; 3], off: f32) -> [f32; 2] {
         let Light { ambient, diffuse, specular, .. } = self.light;
         let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
-        let slope = [gradient[0] * self.per[0], gradient[1] * self.per[1], gradient[2] * self.per[2]];
+        let slope = self.per_world_unit(gradient);
         let (length, facing) = (dot(slope, slope).sqrt(), dot(slope, self.to_viewer));
         let turned = if facing < 0.0 { -1.0 } else { 1.0 } / length.max(f32::MIN_POSITIVE);
         // Where it may be turned to the other side, nothing is known of the direction.
@@ -95,9 +95,9 @@ impl Shader {
         let [middle, half] = [0.5 * (shares[0] + shares[1]), 0.5 * (shares[1] - shares[0])];
         let way: [f32; 3] = std::array::from_fn(|i| to[i] / most - from[i] / most);
         let at = std::array::from_fn(|i| from[i] / most + middle * way[i]);
-        let way = [way[0] * self.per[0], way[1] * self.per[1], way[2] * self.per[2]];
+        let way = self.per_world_unit(way);
         let off = off / most + half * dot(way, way).sqrt();
-        let slope = [at[0] * self.per[0], at[1] * self.per[1], at[2] * self.per[2]];
+        let slope = self.per_world_unit(at);
         if dot(slope, self.to_viewer).abs() <= off {
             return self.any_direction(); // also that of no gradient
         }
@@ -111,6 +111,12 @@ impl Shader {
         let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
         let largest = [(ambient + diffuse).max(1.0) + OF_LIGHT, specular + OF_LIGHT];
         [[(ambient - OF_LIGHT).clamp(0.0, 1.0), 0.0], largest]
+    }
+
+    /// The change per world unit of a field with this gradient per voxel.
+    #[inline(always)]
+    fn per_world_unit(&self, gradient: [f32; 3]) -> [f32; 3] {
+        [gradient[0] * self.per[0], gradient[1] * self.per[1], gradient[2] * self.per[2]]
     }
 
     /// The most light that a colour gives.
@@ -131,7 +137,7 @@ impl Shader {
     fn shade_cell(&self, gradient: [f32; 3]) -> [f32; 2] {
         let Light { ambient, diffuse, specular, .. } = self.light;
         let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
-        let slope = [gradient[0] * self.per[0], gradient[1] * self.per[1], gradient[2] * self.per[2]];
+        let slope = self.per_world_unit(gradient);
         let square = dot(slope, slope);
         let length = square.max(f32::MIN_POSITIVE).sqrt();
         let turned = if dot(slope, self.to_viewer) < 0.0 { -1.0 } else { 1.0 } / length;

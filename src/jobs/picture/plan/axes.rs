@@ -2,7 +2,7 @@
 
 use super::units::{attribute_text, in_letters};
 use crate::picture::values::AxisPosition;
-use wavesplat_core::base::description::{Description, coordinates, sides};
+use wavesplat_core::base::description::{Description, coordinates, sides, unwrap_degrees};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
 use wavesplat_engine::file::{CoefficientFile, setting};
@@ -161,15 +161,6 @@ impl Axis {
         let high = (low + 1).min(self.at.len() - 1);
         let share = voxel - low as f64;
         if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
-    }
-}
-
-/// Adds whole turns where longitudes jump back by most of one, as the grid has them.
-fn unwrap_degrees(at: &mut [f64]) {
-    for i in 1..at.len() {
-        if at[i] < at[i - 1] - 180.0 {
-            at[i..].iter_mut().for_each(|v| *v += 360.0);
-        }
     }
 }
 
