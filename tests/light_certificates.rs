@@ -383,7 +383,7 @@ fn modes_that_cannot_be_certified_are_refused() {
     let Mode::Composite { transfer, .. } = mode(&opacities()[0], (-3.0, 3.0), None) else { unreachable!() };
     let planes = vec![Plane { axis: 2, at: 3.0 }];
     let with_planes = Mode::Composite { transfer, unit: None, slices: None, light: None, planes: planes.clone() };
-    for mode in [with_planes, Mode::Mip { slices: None }, Mode::Planes { planes }] {
+    for mode in [with_planes, Mode::Mip { slices: None }, Mode::Planes { planes, panels: Vec::new() }] {
         let config = certified(view(0.0, 0.0, [8, 8]), &grid, 2, mode);
         let refused = render(&mut direct(&source, None), &config, &wavesplat::base::progress::Silent, &mut |_| Ok(()));
         assert!(refused.unwrap_err().to_string().contains("composites without planes"));

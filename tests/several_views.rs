@@ -126,7 +126,7 @@ fn paired_views_show_only_their_own_frame() {
     let plain = looking(view(0.0, 0.0, [70, 66]), 0.0, Quantity::Mean, &GRID, FRAMES);
     let surface = wavesplat::render::Surface { value: 0.3, colour: [1.0; 3], opacity: 0.5 };
     let iso = Mode::Iso { surfaces: vec![surface], light: wavesplat::render::Light::default(), slices: None };
-    let planes = Mode::Planes { planes: vec![Plane { axis: 2, at: 20.5 }] };
+    let planes = Mode::Planes { planes: vec![Plane { axis: 2, at: 20.5 }], panels: Vec::new() };
     let pairs = [1, 4, 4, 9, 10];
     for mode in [Mode::Projection, Mode::Mip { slices: None }, iso, planes] {
         let all = RenderConfig { views: views(), mode, ..plain.clone() };

@@ -34,7 +34,7 @@ pub use program::main;
 pub use remote::RemoteArgs;
 pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
-pub use values::{Dims, Size, share};
+pub use values::{Dims, Size};
 use wavesplat_core::base::inputs::spare_inputs;
 use wavesplat_core::base::values::{FrameList, FrameRange, Numbers, Pair, RegionSpec, Triple};
 

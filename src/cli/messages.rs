@@ -119,7 +119,7 @@ pub fn advice(remedy: &Remedy) -> Cow<'static, str> {
                 .into();
         }
         Remedy::Try(field, value) => return format!("try --{} {value}", name(field)).into(),
-        Remedy::KeepRange => "--keep range keeps extracted samples within the extremes of the source",
+        Remedy::KeepRange => "--keep range promises decoded samples within the extremes of the source",
         Remedy::Allow(field) => return format!("allow a larger error by --{}", name(field)).into(),
         Remedy::BuildWith(feature) => {
             return format!("build with cargo build --release --features {feature}").into();

@@ -20,14 +20,6 @@ impl FromStr for Size {
     }
 }
 
-/// Parses a share. The caller checks that it is from 0 to 1.
-///
-/// # Errors
-/// The text is not a number.
-pub fn share(text: &str) -> std::result::Result<f64, String> {
-    text.parse().map_err(|_| "takes a share, 0 to 1; 2 % is 0.02".into())
-}
-
 /// `NXxNYxNZ` or `NXxNYxNZxNT`, x fastest.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Dims(pub Vec<usize>);

@@ -145,7 +145,7 @@ fn info_describes_frames_and_estimates_their_file() {
     );
     let text = work.wavesplat("info --frames 0:4 a.npy --estimate").ok();
     assert!(text.text().lines().any(|line| line.trim_start().starts_with("0.001 ")), "{}", text.text());
-    work.wavesplat("info a.npy --estimate 1%").fails(2, &["--estimate", "1%", "2 % is 0.02"]);
+    work.wavesplat("info a.npy --estimate few").fails(2, &["--estimate", "few", "0.02 or 2%"]);
     work.wavesplat("info --estimate a.npy").fails(2, &["--estimate", "after the inputs"]);
     work.wavesplat("info a.wspl --estimate").fails(2, &["--estimate is for frames"]);
     work.piped("info - --estimate", &work.read("a.npy")).fails(2, &["standard input"]);

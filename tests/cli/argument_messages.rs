@@ -55,7 +55,7 @@ fn messages_about_missing_or_wrong_arguments_give_the_right_form() {
     work.render("a.npy -o a.png").fails(2, &["a.npy", "convert frames first", "--method direct"]);
     work.render(". -o a.png").fails(2, &["convert frames first", "--method direct"]);
     for (option, words) in [
-        ("--tolerance 1%", ["--tolerance", "2 % is 0.02"]),
+        ("--tolerance 1per", ["--tolerance", "0.02 or 2%"]),
         ("--threads 0", ["--threads", "at least 1"]),
         ("--memory 5", ["5 bytes", "like 512MiB"]),
         ("--memory 5MiB --window 64", ["MiB; give that", "--window or --block"]),

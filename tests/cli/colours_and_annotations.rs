@@ -54,7 +54,7 @@ fn automatic_ranges_are_near_those_of_all_voxels_in_all_frames() {
     work.wavesplat("convert a.npy -o a.wspl --window 4").ok();
     work.wavesplat("convert a.npy -o haar.wspl --window 4 --basis haar --space none").ok();
     for input in ["a.wspl", "haar.wspl", "a.npy --method direct"] {
-        for mode in ["", "--quantity emission", "--mode mip"] {
+        for mode in ["--beyond none", "--quantity emission", "--mode mip"] {
             work.render(&format!("{input} --size 64x64 {mode} -o all.npy --force")).ok();
             let [lo, hi] = extremes(&floats(&read_npy(&work.read("all.npy")).1));
             let range = |options: &str| {
@@ -77,13 +77,39 @@ fn automatic_ranges_depend_on_the_map_and_the_norm() {
         let json = work.render(&format!("a.wspl {SIZE} --frames 2 -o a.png --force --json {options}")).ok().json();
         [0, 1].map(|i| json["range"][i].as_f64().unwrap())
     };
-    let [lo, hi] = range("");
+    let [lo, hi] = range("--beyond none");
     assert!(lo < 0.0 && 0.0 < hi);
     let most = hi.max(-lo);
-    assert_eq!(range("--colormap coolwarm"), [-most, most]);
+    assert_eq!(range("--beyond none --colormap coolwarm"), [-most, most]);
+    let [inner, outer] = range("");
+    assert!(lo < inner && outer < hi, "short rays have the extremes");
     let [least, most] = range("--norm log");
     assert!(most == hi && hi * 1e-4 <= least && least < hi);
     assert_eq!(range("--norm log --range 1,10"), [1.0, 10.0]);
+}
+
+/// A volume of ones shows the lengths of the rays, and so how other values are weighed.
+#[test]
+fn means_are_weighed_by_the_lengths_of_their_rays() {
+    let work = Work::with_file("");
+    work.write("ones.npy", Archive::of([20, 14, 10], 3, |_, _, _, _| 1.0).npy());
+    let picture = |options: &str| {
+        let common = format!("{SIZE} --frames 2 --format gray16 -o -");
+        let bytes = work.render(&format!("{options} {common}")).ok().out;
+        bytes.chunks_exact(2).map(|two| f64::from(u16::from_le_bytes([two[0], two[1]])) / 65535.0).collect::<Vec<_>>()
+    };
+    let lengths = picture("ones.npy --method direct --beyond 0 --range 0,1");
+    let shown = picture("a.wspl --beyond=-1 --range=-3,4").into_iter().map(|share| share * 7.0 - 3.0);
+    work.render(&format!("a.wspl {SIZE} --frames 2 -o v.npy")).ok();
+    let means = floats(&read_npy(&work.read("v.npy")).1);
+    let mut seen = [0; 2];
+    for ((mean, shown), length) in means.iter().zip(shown).zip(lengths).filter(|((mean, _), _)| !mean.is_nan()) {
+        let expected = -1.0 + length * (f64::from(*mean) + 1.0);
+        assert!((shown - expected).abs() < 7e-4, "{shown} instead of {expected} for {mean}, {length}");
+        seen[usize::from(length > 0.999)] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 30), "short and long rays: {seen:?}");
+    work.render("a.wspl -o x.png --beyond far").fails(2, &["--beyond", "auto, none, or a value"]);
 }
 
 #[test]
@@ -266,4 +292,40 @@ fn the_label_of_the_colour_bar_can_be_chosen() {
     assert!(shown("--bar-title Speed") != shown("") && shown("--bar-title Speed") != shown("--bar-title Depth"));
     let json = work.render("a.wspl --frames 2 -o t.png --annotate --bar-title Speed --json").ok().json();
     assert_eq!(json["picture"]["bar_title"].as_str(), Some("Speed"));
+}
+
+/// A pulse in few of many frames.
+#[test]
+fn pages_open_where_there_is_something_to_see() {
+    let work = Work::new();
+    let pulse =
+        |x: usize, y: usize, _: usize, t: usize| if t == 9 && x.abs_diff(8) + y.abs_diff(8) < 4 { 1.0 } else { 0.0 };
+    work.write("pulse.npy", Archive::of([16, 16, 8], 24, pulse).npy());
+    work.write("waves.npy", Archive::smooth([16, 16, 8], 24).npy());
+    for (input, opening) in [("pulse", 9), ("waves", 12)] {
+        work.render(&format!("{input}.npy --method direct --size 40x40 -o {input}.html")).ok();
+        let page = String::from_utf8(work.read(&format!("{input}.html"))).unwrap();
+        assert!(page.contains(&format!("\"opening\":{opening},")), "{input}");
+    }
+}
+
+/// A surface has the colour of its own, which no bar explains.
+#[test]
+fn isosurfaces_are_listed_instead_of_a_bar() {
+    let work = Work::with_file("");
+    let picture = |options: &str| {
+        decode_png(&work.render(&format!("a.wspl --frames 2 --size 300x240 --annotate=bar {options} -o -")).ok().out)
+    };
+    let right = |pixels: &[u8]| -> Vec<[u8; 3]> {
+        let rows = pixels.chunks(900).flat_map(|row| row[3 * 240..].chunks(3));
+        rows.map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect()
+    };
+    let shown = right(&picture("--iso 0.5:ff0000:1,1:00ff00:1"));
+    let count = |colour: [u8; 3]| shown.iter().filter(|pixel| **pixel == colour).count();
+    let [red, green] = [count([255, 0, 0]), count([0, 255, 0])];
+    assert!(red > 40 && green == red, "two swatches: {red} {green}");
+    let first = |colour: [u8; 3]| shown.iter().position(|pixel| *pixel == colour).unwrap();
+    assert!(first([0, 255, 0]) < first([255, 0, 0]), "the larger value is above");
+    let coloured = shown.iter().filter(|[r, g, b]| r != g || g != b).count();
+    assert_eq!(coloured, red + green, "there is no bar");
 }

@@ -26,7 +26,7 @@ fn texts(bytes: &[u8]) -> BTreeMap<String, String> {
 #[test]
 fn sixteen_bits_of_grey_hold_the_values() {
     let work = Work::with_file("");
-    let options = format!("a.wspl {SIZE} --frames 2 --range=-1,1.5");
+    let options = format!("a.wspl {SIZE} --frames 2 --range=-1,1.5 --beyond none");
     work.render(&format!("{options} -o v.npy")).ok();
     work.render(&format!("{options} -o grey.png --depth 16 --colormap grey")).ok();
     work.render(&format!("{options} -o v.gray16")).ok();

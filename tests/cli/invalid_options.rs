@@ -111,7 +111,7 @@ fn an_extension_without_a_format_is_refused_with_the_known_ones() {
 fn other_videos_are_refused_with_the_pipe_that_makes_them() {
     let work = Work::with_file("");
     for ending in ["mov", "avi", "mkv", "MKV"] {
-        let pipe = format!("wavesplat-render a.wspl -o - --format y4m | ffmpeg -i - -pix_fmt yuv420p run.{ending}");
+        let pipe = format!("wavesplat-render a.wspl -o - --format y4m | ffmpeg -i - run.{ending}");
         work.render(&format!("a.wspl -o run.{ending}")).fails(2, &[".mp4", &pipe]);
     }
     work.render("a.wspl --size 20x20 -o run.mkv --format y4m").ok();

@@ -3,6 +3,7 @@
 mod archives; // archives of other programs are converted, shown and described
 mod argument_messages; // messages about arguments say what to do next
 mod bound_reports; // how `convert`, `info` and `verify` report each error bound
+mod bodies; // sides of a patient, slices side by side, greys, thick layers
 mod changed_while_read; // inputs that change while they are read
 mod channels; // files of colours: reports, refusals, resuming
 mod colours_and_annotations; // colour maps, ranges, annotations, sheets, moving PNGs

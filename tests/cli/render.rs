@@ -92,11 +92,11 @@ fn arrays_hold_values_with_nan_for_background() {
 fn streams_have_the_sizes_that_readers_expect() {
     let work = Work::with_file("");
     let video = work.render(&format!("a.wspl {SIZE} --frames :3 --fps 30 -o - --format y4m")).ok().out;
-    let header = b"YUV4MPEG2 W48 H40 F30:1 Ip A1:1 C444 XCOLORRANGE=FULL\n";
+    let header = b"YUV4MPEG2 W48 H40 F30:1 Ip A1:1 C420jpeg XCOLORRANGE=FULL\n";
     assert!(video.starts_with(header));
-    assert_eq!(video.len(), header.len() + 3 * (6 + 48 * 40 * 3));
+    assert_eq!(video.len(), header.len() + 3 * (6 + 48 * 40 * 3 / 2));
     for frame in 0..3 {
-        assert_eq!(&video[header.len() + frame * (6 + 48 * 40 * 3)..][..6], b"FRAME\n");
+        assert_eq!(&video[header.len() + frame * (6 + 48 * 40 * 3 / 2)..][..6], b"FRAME\n");
     }
     let rgb = work.render(&format!("a.wspl {SIZE} --frames :3 -o - --format rgb24")).ok().out;
     assert_eq!(rgb.len(), 3 * 48 * 40 * 3);

@@ -7,7 +7,7 @@ fn singles(work: &Work, name: &str) -> Vec<f32> {
 }
 
 /// The value between voxels of a frame, in the plainest way; outermost samples go on outside.
-fn between(archive: &Archive, frame: usize, place: [f64; 3]) -> f64 {
+pub(super) fn between(archive: &Archive, frame: usize, place: [f64; 3]) -> f64 {
     let mut sum = 0.0;
     for corner in 0..8 {
         let (mut weight, mut voxel) = (1.0, [0; 3]);

@@ -156,7 +156,7 @@ fn the_page_waits_for_a_server_that_comes_back() {
     let again = Served::start_with(&work, &format!("a.wspl --port {port}"), token);
     assert_eq!(again.address, address);
     browser.wait(&format!("{FULL} && element('status').textContent === ''"));
-    let is_wanted = "steering.live.kept.get(steering.live.key(true)).get(0).planes[0].every((value, n) => !(Math.abs(value - player.shown.planes[0][n]) > 1e-4))";
+    let is_wanted = "steering.live.kept.get(steering.live.key(true)).get(player.index).planes[0].every((value, n) => !(Math.abs(value - player.shown.planes[0][n]) > 1e-4))";
     assert!(browser.js("steering.live.look.view[0]") != 30 && browser.js(is_wanted) == true);
 }
 

@@ -45,7 +45,7 @@ fn texts_of_files_never_become_markup() {
     let title = "</script><script>window.hacked=1</script><img/src=x/onerror=window.hacked=1>&lt;{script}{blocks}";
     work.render(&format!("a.wspl --size 60x50 --title {title} -o page.html")).ok();
     browser.open_file(&work.path("page.html"));
-    browser.wait("document.documentElement.dataset.drawn === '0:0'");
+    browser.wait("document.documentElement.dataset.drawn === '0:6'"); // in the middle
     assert_eq!(browser.js("[window.hacked ?? null, element('title').textContent]"), json!([null, title]));
     assert!(browser.complaints.is_empty(), "{:?}", browser.complaints);
 }

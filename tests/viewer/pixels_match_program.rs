@@ -78,7 +78,7 @@ fn certified_errors_hold_for_the_pictures() {
     browser.wait("player.shown?.beneath");
     let [coded, error] = ["beneath", "planes[0]"]
         .map(|of| browser.js(&format!("Array.from(player.shown.{of}, v => Number.isNaN(v) ? null : v)")));
-    let look = browser.js("JSON.stringify(steering.live.request([0, 1], true).look)");
+    let look = browser.js("JSON.stringify(steering.live.request([player.index, player.index + 1], true).look)");
     let raw = Served::start(&work, "a.npy");
     browser.open(&raw.address);
     let read = format!(

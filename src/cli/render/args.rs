@@ -2,13 +2,13 @@
 
 use super::groups::{AnnotationArgs, ColourArgs, MotionArgs, PartialArgs, SampleArgs, SeriesArgs, SliceArgs};
 use crate::choice::choice;
-use crate::{CommonArgs, InputArgs, RemoteArgs, share};
+use crate::{CommonArgs, InputArgs, RemoteArgs};
 use clap::Parser;
 use std::path::PathBuf;
 use wavesplat_core::base::address::is_address;
 use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::error::Result;
-use wavesplat_core::base::values::{FrameList, RegionSpec, Triple, Whole};
+use wavesplat_core::base::values::{FrameList, RegionSpec, Triple, Whole, share};
 use wavesplat_engine::render::sink::{Depth, PictureFormat};
 use wavesplat_engine::render::{Limit, Quantity, SplatSource};
 use wavesplat_jobs::picture::values::{Detail, Exaggeration, ViewAngles};
@@ -97,7 +97,7 @@ pub struct Cli {
     /// view's largest weights (elsewhere in inverse proportion to the weights); for emissions, a share of the brightest
     /// pixel that the largest sample could give. 0 uses the exact method [default: --tolerance or the file's tolerance,
     /// at most 1e-3]
-    #[arg(long, value_name = "E", allow_hyphen_values = true, help_heading = "Kernel")]
+    #[arg(long, value_name = "E", value_parser = share, allow_hyphen_values = true, help_heading = "Kernel")]
     pub(super) splat_error: Option<f64>,
     /// Level of detail: read and splat only every 2^N-th voxel along each axis, with a wider kernel. auto takes the
     /// coarsest level whose voxels are no larger than a pixel. The picture shows the coarser lattice; error bounds do
@@ -204,6 +204,8 @@ impl Cli {
             range: colour.range,
             norm: colour.norm,
             clear: colour.clear,
+            beyond: colour.beyond,
+            convention: slices.convention,
             background: colour.background,
             annotate: around.annotate,
             title: around.title.clone(),

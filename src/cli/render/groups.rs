@@ -7,7 +7,9 @@ use std::path::PathBuf;
 use wavesplat_core::base::values::{Pair, RegionSpec};
 use wavesplat_core::colour::{Norm, Opacities};
 use wavesplat_engine::render::annotate::Parts;
-use wavesplat_jobs::picture::values::{ClearSpec, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme};
+use wavesplat_jobs::picture::values::{
+    BeyondSpec, ClearSpec, Convention, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme,
+};
 use wavesplat_jobs::picture::{check_fps, check_speed};
 
 /// Options for the camera over time, and for the speed of movies.
@@ -47,6 +49,11 @@ pub(super) struct ColourArgs {
     /// the least value, or 0, if many pixels of small pictures are near it
     #[arg(long, value_name = "LO,HI", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     pub(super) clear: ClearSpec,
+    /// For means in colours: the value that rays meet beyond the volume, if all are taken for as long as the longest: so the
+    /// rim of a plate is no brighter than its middle. auto is the value of empty space, or the median; none shows plain
+    /// means
+    #[arg(long, value_name = "V", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
+    pub(super) beyond: BeyondSpec,
     /// Background colour, like ffffff [default: that of the theme]
     #[arg(long, value_name = "RRGGBB", help_heading = "Colour")]
     pub(super) background: Option<HexColour>,
@@ -88,9 +95,9 @@ pub(super) struct SampleArgs {
     /// colour [default: viridis; its own values, or those of all frames]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Along the ray")]
     pub(super) transfer_function: Option<String>,
-    /// Opacities of a composite at shares of the range, like 0:0,0.5:0.1,1:0.8, or auto: empty space (the
+    /// Opacities of a composite at shares of the range, like 0:0,50%:10%,1:0.8, or at values, like @280:0.1; or auto: empty space (the
     /// least value or 0), or else the most common value, is transparent, and rare values are opaque [default: the file's, or auto]
-    #[arg(long, value_name = "SHARE:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
+    #[arg(long, value_name = "AT:A,...", allow_hyphen_values = true, help_heading = "Along the ray")]
     pub(super) opacity: Option<Opacities>,
     /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
@@ -118,9 +125,12 @@ pub(super) struct SliceArgs {
     /// Show the samples on a plane across an axis, alone or within --mode composite. For more planes, repeat the option
     /// or separate them with commas. AXIS is x, y, z or the data's own name, like lat. PLACE is a share like 0.3 (with
     /// a point, 0.0 to 1.0) or 30%, a voxel like #12, or else a coordinate like 45, -500 or 120m; @0.3 is always a
-    /// coordinate. A single slice is seen face-on unless --view is given
+    /// coordinate. A single slice is seen face-on, and three across all axes side by side, unless --view is given
     #[arg(long, value_name = "AXIS=PLACE", value_delimiter = ',', allow_hyphen_values = true, help_heading = "View")]
     pub(super) slice: Vec<SliceSpec>,
+    /// Which side of a patient slices show at the right
+    #[arg(long, value_parser = choice::<Convention>(), default_value = "neurological", help_heading = "View")]
+    pub(super) convention: Convention,
 }
 
 /// Options for time series.

@@ -112,6 +112,14 @@ impl Region {
         }
     }
 
+    /// The least region around both.
+    pub fn joined(&self, other: &Self) -> Self {
+        Self {
+            start: std::array::from_fn(|a| self.start[a].min(other.start[a])),
+            end: std::array::from_fn(|a| self.end[a].max(other.end[a])),
+        }
+    }
+
     /// Whether every voxel of `other` is inside.
     pub fn contains(&self, other: &Self) -> bool {
         (0..3).all(|a| self.start[a] <= other.start[a] && other.end[a] <= self.end[a])

@@ -53,6 +53,16 @@ impl<const N: usize> fmt::Display for Numbers<N> {
     }
 }
 
+/// A share, as a number like 0.05 or in percent like `5%`. The caller checks its limits.
+///
+/// # Errors
+/// The text is no number.
+pub fn share(text: &str) -> std::result::Result<f64, String> {
+    let (number, whole) = text.trim().strip_suffix('%').map_or((text.trim(), 1.0), |percent| (percent, 100.0));
+    let number = number.trim_end().parse::<f64>().ok().filter(|number| number.is_finite());
+    number.map(|number| number / whole).ok_or_else(|| "takes a share, 0 to 1, like 0.02 or 2%".into())
+}
+
 /// A range of frames: `a:b` or `a:b:step`, without b, or one number. a and b are optional, and count from the end if
 /// negative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -228,6 +238,12 @@ mod tests {
 
     fn frames(text: &str, all: usize) -> Option<Vec<usize>> {
         text.parse::<FrameList>().ok()?.resolve(all).ok()
+    }
+
+    #[test]
+    fn shares_may_be_in_percent() {
+        assert_eq!(["0.05", "5%", " 5 % ", "-1%", "2"].map(share), [0.05, 0.05, 0.05, -0.01, 2.0].map(Ok));
+        assert!(["", "%", "5%%", "nan", "inf%", "5 percent"].into_iter().all(|text| share(text).is_err()));
     }
 
     #[test]

@@ -19,7 +19,7 @@ mod table;
 pub use distribution::{Common, Distribution};
 pub use named::NAMES;
 use named::Named;
-pub use opacities::{Opacities, OpacityPoints};
+pub use opacities::{At, Opacities, OpacityPoints};
 pub use scale::{Clear, Norm, Scale};
 pub use space::ColourSpace;
 
@@ -221,13 +221,17 @@ impl TransferFunction {
     }
 
     /// The range to stretch the map over for values from `lo` to `hi`. It is symmetric around 0 if the colours diverge
-    /// and the values lie on both sides of 0. It is never empty.
+    /// and the values lie on both sides of 0, and begins at 0 if the values are positive and not far from 0. It is never
+    /// empty.
     pub fn suitable(&self, (lo, hi): (f64, f64)) -> (f64, f64) {
         /// A side shorter than this share of the other does not count: values that end near 0 may overshoot a little.
         const SIDE: f64 = 0.05;
+        /// A range that begins below this share of its end begins at 0.
+        const NEAR: f64 = 0.25;
         if self.is_diverging() && lo < -SIDE * hi && hi > -SIDE * lo {
             return (-hi.max(-lo), hi.max(-lo));
         }
+        let lo = if (0.0..NEAR * hi).contains(&lo) { 0.0 } else { lo };
         (lo, if lo < hi { hi } else { lo + lo.abs().max(1.0) })
     }
 

@@ -34,12 +34,21 @@ pub struct Kernel {
     pub sigma: f64,
     /// Attenuation per world unit of depth.
     pub tau: f64,
+    /// Whether slices through the volume take a kernel that is narrower along axes with less than the largest spacing, so that thick
+    /// layers do not blur what is within them.
+    #[serde(default)]
+    pub follows_axes: bool,
 }
 
 impl Kernel {
-    /// The default kernel of a grid: sigma is 0.75 of the largest spacing, without attenuation.
+    /// The default kernel of a grid: sigma is 0.75 of the largest spacing, or in slices of that along each axis, without attenuation.
     pub fn for_grid(grid: &Grid) -> Self {
-        Self { sigma: 0.75 * grid.largest_spacing(), tau: 0.0 }
+        Self { sigma: 0.75 * grid.largest_spacing(), tau: 0.0, follows_axes: true }
+    }
+
+    /// The standard deviation along an axis of a grid, in voxels, for slices.
+    pub fn sigma_in_voxels(&self, grid: &Grid, axis: usize) -> f64 {
+        self.sigma / if self.follows_axes { grid.largest_spacing() } else { grid.spacing[axis] }
     }
 
     /// A kernel with the default sigma unless one is given.
@@ -47,6 +56,7 @@ impl Kernel {
     /// # Errors
     /// A sigma that is not above 0, a tau below 0, or either not finite.
     pub fn new(sigma: Option<f64>, tau: f64, grid: &Grid) -> Result<Self> {
+        let follows_axes = sigma.is_none();
         let sigma = sigma.unwrap_or(Self::for_grid(grid).sigma);
         if !(sigma.is_finite() && sigma > 0.0) {
             return Err(Error::setting("sigma", "takes a number above 0"));
@@ -54,7 +64,7 @@ impl Kernel {
         if !(tau.is_finite() && tau >= 0.0) {
             return Err(Error::setting("tau", "takes a number of 0 or more"));
         }
-        Ok(Self { sigma, tau })
+        Ok(Self { sigma, tau, follows_axes })
     }
 }
 
@@ -107,7 +117,7 @@ pub struct Footprint {
 impl Footprint {
     /// The footprint of a kernel seen at `scale` pixels per world unit, splatted by `method` (eq 2).
     pub fn new(kernel: Kernel, grid: &Grid, scale: f64, method: Method) -> Result<Self> {
-        let Kernel { sigma, tau } = kernel;
+        let Kernel { sigma, tau, .. } = kernel;
         let cell: f64 = grid.spacing.iter().product();
         let in_pixels = sigma * scale;
         let decay = 0.5 / (in_pixels * in_pixels);
@@ -236,8 +246,13 @@ mod tests {
     use super::*;
 
     fn footprint(scale: f64) -> Footprint {
-        Footprint::new(Kernel { sigma: 0.75, tau: 0.1 }, &Grid::unit([4, 4, 4]), scale, Method::EXACT)
-            .expect("sensible numbers")
+        Footprint::new(
+            Kernel { sigma: 0.75, tau: 0.1, follows_axes: false },
+            &Grid::unit([4, 4, 4]),
+            scale,
+            Method::EXACT,
+        )
+        .expect("sensible numbers")
     }
 
     #[test]

@@ -198,7 +198,9 @@ fn check_bound(input: &CodedInput) -> Result<()> {
     check_keep(input)?;
     let Some(error) = config.max_error else {
         let is_share = (0.0..=1.0).contains(&config.tolerance);
-        return is_share.then_some(()).ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1; 2 % is 0.02"));
+        return is_share
+            .then_some(())
+            .ok_or_else(|| Error::setting("tolerance", "takes a share, 0 to 1, like 0.02 or 2%"));
     };
     if !(0.0..=f64::MAX).contains(&error) {
         return Err(Error::setting("max_error", "takes a finite number of 0 or more, in the samples' unit"));

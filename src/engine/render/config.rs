@@ -87,6 +87,8 @@ pub enum Mode {
     Planes {
         /// The planes, at least one.
         planes: Vec<Plane>,
+        /// One view for each plane, which shows it alone in its part of the picture; or none, and the view of the picture shows all.
+        panels: Vec<View>,
     },
 }
 

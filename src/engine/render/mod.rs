@@ -99,8 +99,8 @@ fn renderer<'a>(scene: &dyn Scene, config: &'a RenderConfig) -> Result<Box<dyn R
             let sliced = Sliced::new(grid, config, |view| Isosurfaces::new(surfaces, *light, view))?;
             Box::new(if config.certify { sliced.certified() } else { sliced })
         }
-        Mode::Mip { .. } => Box::new(Sliced::new(grid, config, |_| Largest)?),
-        Mode::Planes { planes } => Box::new(Planes::new(grid, config, planes)?),
+        Mode::Mip { .. } => Box::new(Sliced::new(grid, config, Largest::new)?),
+        Mode::Planes { planes, panels } => Box::new(Planes::new(grid, config, planes, panels)?),
     })
 }
 

@@ -8,7 +8,7 @@ use super::plan::modes::{check_slices, mode_name, unit};
 use super::plan::opened::Opened;
 use super::plan::provenance::provenance;
 use super::plan::ranges::Needed;
-use super::plan::ranges::Ranges;
+use super::plan::ranges::{Ranges, rays};
 use super::plan::sinks::SinkInput;
 use super::plan::targets::AllTargets;
 use super::report::Outcome;
@@ -16,7 +16,7 @@ use super::report::{Reported, note_errors, summary, written};
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::session::Session;
-use super::values::ModeName;
+use super::values::{BeyondSpec, ModeName};
 use crate::report::report_text;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -266,8 +266,11 @@ impl Sum<'_> {
             pictures: &targets.pictures,
             errors: None,
             colours: None,
+            is_of_body: setup.axes.iter().any(|axis| axis.sides.is_some()),
+            least: None,
         };
-        let ranges = |needed: Needed| if needed.pictures { self.ranges() } else { Ok(Ranges::default()) };
+        let ranges =
+            |needed: Needed| if needed.pictures { self.ranges(&config, needed.beyond) } else { Ok(Ranges::default()) };
         let colouring = input.colouring(ranges, reporter)?;
         let mut annotation = annotation(request, setup.values.clone(), total.time_labels());
         let provenance = provenance(request, &setup.grid, &config, None, &annotation.times, &colouring);
@@ -277,15 +280,14 @@ impl Sum<'_> {
         note_scale(&annotation, reporter);
         note_title(request, &annotation, &config, reporter);
         let (targets, annotation) = (&targets, &annotation);
-        let sinks =
-            SinkInput { request, config: &config, targets, colouring: &colouring, provenance: &provenance, annotation };
-        let mut sinks = sinks.open()?;
+        let (grid, config, colouring, provenance) = (&setup.grid, &config, &colouring, &provenance);
+        let mut sinks = SinkInput { request, grid, config, targets, colouring, provenance, annotation }.open()?;
         let report = total.render(self.frames, progress.as_ref(), &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
         let (parts, shown, seconds) = (total.parts(), config.shown().len(), report.seconds);
         reporter.detail(format_args!("{parts} parts added to {shown} pictures in {seconds:.3} s"));
         note_errors(request, &report, reporter);
-        self.report(&report, &provenance, colouring.coloured())
+        self.report(&report, provenance, colouring.coloured())
     }
 
     fn report(&self, report: &RenderReport, picture: &Provenance, coloured: ColouredPictures) -> Result<String> {
@@ -305,11 +307,12 @@ impl Sum<'_> {
     }
 
     /// The ranges of the pictures of a few frames.
-    fn ranges(&self) -> Result<Ranges> {
+    fn ranges(&self, config: &RenderConfig, beyond: BeyondSpec) -> Result<Ranges> {
         let progress = self.reporter.progress("range", "pictures");
-        Ranges::from_pictures(self.frames, |some, give| {
+        let (rays, size) = (rays(config, &self.total.setup().grid), config.views[0].size);
+        Ranges::from_pictures(self.frames, beyond, &rays, size, |some, give| {
             self.total.render(some, progress.as_ref(), &mut |rendered| {
-                give(rendered.picture);
+                give(&rendered);
                 Ok(())
             })?;
             Ok(())

@@ -1,7 +1,8 @@
 //! The request for pictures.
 
 use super::values::{
-    ClearSpec, Detail, Exaggeration, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList, Theme, ViewAngles,
+    BeyondSpec, ClearSpec, Convention, Detail, Exaggeration, HexColour, ModeName, PointSpec, SliceSpec, SurfaceList,
+    Theme, ViewAngles,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -50,6 +51,9 @@ pub struct PictureRequest {
     pub region: Option<RegionSpec>,
     /// Planes through the volume.
     pub slice: Vec<SliceSpec>,
+    /// The side of a patient at the right of slices.
+    #[serde(with = "choice")]
+    pub convention: Convention,
     /// Attenuation per world unit of depth.
     pub tau: f64,
     /// Standard deviation of the kernel in world units; by default 0.75 of the largest spacing.
@@ -99,6 +103,8 @@ pub struct PictureRequest {
     pub norm: Norm,
     /// Values that show the background.
     pub clear: ClearSpec,
+    /// The value that short rays meet beyond the volume.
+    pub beyond: BeyondSpec,
     /// The background; by default that of the theme.
     pub background: Option<HexColour>,
     /// The parts that are drawn around the volume.
@@ -157,6 +163,7 @@ impl Default for PictureRequest {
             frames: None,
             region: None,
             slice: Vec::new(),
+            convention: Convention::Neurological,
             tau: 0.0,
             sigma: None,
             splat_error: None,
@@ -179,6 +186,7 @@ impl Default for PictureRequest {
             range: None,
             norm: Norm::Linear,
             clear: ClearSpec::Auto,
+            beyond: BeyondSpec::Auto,
             background: None,
             annotate: None,
             title: None,
@@ -293,11 +301,12 @@ pub fn check_speed(speed: f64) -> std::result::Result<(), String> {
 }
 
 /// Fields for how finished pictures are coloured and written.
-const FINISH: [&str; 12] = [
+const FINISH: [&str; 13] = [
     "colormap",
     "range",
     "norm",
     "clear",
+    "beyond",
     "background",
     "bar_title",
     "theme",

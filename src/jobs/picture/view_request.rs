@@ -7,8 +7,9 @@ use wavesplat_core::base::error::Result;
 use wavesplat_core::colour::NAMES;
 
 /// The fields that a page may set.
-const FIELDS: [&str; 18] = [
+const FIELDS: [&str; 19] = [
     "annotate",
+    "beyond",
     "center",
     "clear",
     "colormap",

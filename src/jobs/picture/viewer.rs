@@ -3,6 +3,7 @@
 use super::plan::Plan;
 use super::plan::config::{frames_of, render_config};
 use super::plan::opened::Opened;
+use super::plan::opening::opening_frame;
 use super::plan::ranges::distribution;
 use super::plan::ranges::distribution_of_frames;
 use super::reporter::Caller;
@@ -47,6 +48,8 @@ struct Facts {
     values: String,
     /// The time of each frame.
     labels: Vec<String>,
+    /// The frame that is shown first.
+    opening: usize,
     /// The point in the middle of the volume as it is drawn, and half of its diagonal.
     center: [f64; 3],
     radius: f64,
@@ -120,16 +123,18 @@ impl ViewerSession {
     fn known(&self) -> Result<Facts> {
         // The page gives a view with every request: a section is not stretched as it would be face-on.
         let base = PictureRequest { view: vec![ViewAngles([0.0; 2])], ..self.base.clone() };
-        let Opened { scene, file, annotation, axes, .. } = Opened::new(&self.session, &base, &Caller(&Silent))?;
+        let Opened { mut scene, file, annotation, axes, .. } = Opened::new(&self.session, &base, &Caller(&Silent))?;
         let grid = file.as_ref().map_or(*scene.grid(), |file| file.whole_grid());
         let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
+        let opening = opening_frame(scene.as_mut(), file.as_deref(), self.session.memory, &Silent)?;
         let name = self.session.paths().first().map(|input| public_name(input));
         let name = name.as_deref().and_then(Path::file_name);
         Ok(Facts {
             live: true,
             title: name.unwrap_or_default().to_string_lossy().into_owned(),
             labels: (0..scene.frames().unwrap_or(0)).map(|frame| annotation.stamp(frame)).collect(),
+            opening,
             values: annotation.values,
             center: [0, 1, 2].map(middle),
             radius: sides.iter().map(|side| side * side).sum::<f64>().sqrt() / 2.0,

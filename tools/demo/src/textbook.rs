@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn one_voxel_is_a_gaussian_in_the_middle() {
         let view = View { azimuth: 0.0, elevation: 0.0, roll: 0.0, size: [9; 2], scale: Some(2.0), center: None };
-        let kernel = Kernel { sigma: 0.75, tau: 0.0 };
+        let kernel = Kernel::for_grid(&Grid::unit([1; 3]));
         let splatter = Splatter::new(&Grid::unit([1; 3]), &view, kernel, 2.0).expect("a view");
         let (reach, width) = (splatter.table.side / 2, 9 + splatter.table.side);
         assert_eq!(reach, 3, "two sigma of one and a half pixels");

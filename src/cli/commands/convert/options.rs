@@ -2,11 +2,12 @@
 
 use super::given::GivenOptions;
 use crate::choice::choice;
-use crate::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs, share};
+use crate::{CommonArgs, InputArgs, Numbers, Pair, SelectArgs};
 use clap::{Arg, Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::STANDARD;
+use wavesplat_core::base::values::share;
 use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_engine::convert::shard::Shard;
 use wavesplat_engine::convert::{BestFor, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
@@ -49,7 +50,7 @@ pub(crate) struct ConvertArgs {
     /// Continue an unfinished earlier run of this command. The file gets the bytes of an uninterrupted run
     #[arg(long, help_heading = "Output")]
     pub(super) resume: bool,
-    /// Largest allowed error, as a share of what the bound refers to; 0 keeps every bit [default: 0.01]
+    /// Largest allowed error, as a share of what the bound refers to, like 0.01 or 1%; 0 keeps every bit [default: 1%]
     #[arg(long, value_name = "X", value_parser = share, allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     tolerance: Option<f64>,
     /// Largest allowed error in the samples' unit, instead of --tolerance, for --bound pointwise and rms; 0 keeps every

@@ -6,10 +6,11 @@ mod description;
 mod made_by;
 mod variables;
 
-use crate::{CommonArgs, InputArgs, RemoteArgs, SelectArgs, share};
+use crate::{CommonArgs, InputArgs, RemoteArgs, SelectArgs};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::values::share;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_format::Keep;
 

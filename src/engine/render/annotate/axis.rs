@@ -1,5 +1,6 @@
 //! An axis beside the box: values along an edge, its name, and the sides of a patient.
 
+use super::Panel;
 use super::canvas::Canvas;
 use super::text::Letters;
 use super::ticks::{all_round_values, roundest, texts};
@@ -86,6 +87,17 @@ impl VolumeAxes {
         let edges: Vec<Edge> = edges.filter(|edge| edge.length() >= canvas.letters.size).collect();
         edges.iter().for_each(|edge| self.draw_sides(canvas, edge, rim)); // they have fewer places than values
         edges.iter().for_each(|edge| self.draw_axis(canvas, edge, rim));
+    }
+
+    /// Writes above a slice where it cuts its axis.
+    pub(super) fn write_place(&self, canvas: &mut Canvas<'_>, camera: &Camera, panel: &Panel) {
+        let labels = &self.labels[panel.axis];
+        let value = text(labels.shown(labels.coordinate(panel.at)));
+        let place = format!("{} = {value} {}", labels.name, labels.unit);
+        let corners = (0..8).map(|corner| self.corner(camera, corner));
+        let [mut left, mut right, mut top] = [f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY];
+        corners.for_each(|[x, y]| (left, right, top) = (left.min(x), right.max(x), top.min(y)));
+        canvas.write(place.trim_end(), [(left + right) / 2.0, top - 0.8 * canvas.letters.size]);
     }
 
     /// Draws an axis, whose values begin `rim` pixels from the box.

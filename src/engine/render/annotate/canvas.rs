@@ -8,6 +8,7 @@ use wavesplat_core::colour::Rgb;
 pub(super) struct Canvas<'a> {
     pub(super) pixels: &'a mut [Rgb],
     pub(super) width: usize,
+    pub(super) background: Rgb,
     pub(super) ink: Rgb,
     pub(super) letters: Letters,
     /// The rectangles of all texts, and of the colour bar. Nothing else is drawn there.
@@ -20,7 +21,7 @@ impl<'a> Canvas<'a> {
     /// A picture without texts, with letters of the size that suits it.
     pub(super) fn new(pixels: &'a mut [Rgb], size: [usize; 2], background: Rgb) -> Self {
         let (ink, letters) = (contrast(background), Letters::new(layout::line(size)));
-        Self { pixels, width: size[0], ink, letters, taken: Vec::new(), written: Vec::new() }
+        Self { pixels, width: size[0], background, ink, letters, taken: Vec::new(), written: Vec::new() }
     }
 }
 

@@ -10,6 +10,7 @@ mod layout;
 mod title;
 mod volume;
 mod axis;
+mod bar;
 
 pub use canvas::over;
 pub use layout::{Margins, Parts, margins};
@@ -17,11 +18,11 @@ pub use text::Letters;
 pub use ticks::round_values;
 pub use volume::{AxisLabels, VolumeAxes};
 
-use crate::render::ViewReport;
+use crate::render::{Surface, ViewReport};
 use canvas::{Canvas, Rectangle};
-use layout::{BAR, has_axes, has_bar, has_time};
-use text::shortened;
+use layout::{has_axes, has_bar, has_time};
 use title::Title;
+use wavesplat_core::base::grid::Grid;
 use wavesplat_core::base::time_labels::TimeLabels;
 use wavesplat_core::colour::{Rgb, Scale};
 use wavesplat_core::view::camera::{Camera, View};
@@ -39,6 +40,21 @@ pub struct Annotation {
     pub times: TimeLabels,
     /// The axes of the volume, for its box and the values along it.
     pub axes: Option<VolumeAxes>,
+    /// The isosurfaces, which are listed instead of a colour bar.
+    pub surfaces: Vec<Surface>,
+    /// The slices that share each picture; none if it has one view.
+    pub panels: Vec<Panel>,
+}
+
+/// A slice in its own part of the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Panel {
+    /// The view whose picture has it there.
+    pub view: View,
+    /// The axis that it cuts.
+    pub axis: usize,
+    /// Where it cuts the axis, in voxels.
+    pub at: f64,
 }
 
 /// A finished picture, in which annotations are drawn.
@@ -92,12 +108,13 @@ impl Annotation {
             self.draw_texts(&mut canvas, frame, view.filter(|_| with_angles));
         }
         if let Some(scale) = scale.filter(|_| self.parts.bar && has_bar(size)) {
-            self.draw_bar(&mut canvas, scale);
+            match self.surfaces[..] {
+                [] => bar::draw(&mut canvas, scale, &self.values),
+                _ => bar::draw_surfaces(&mut canvas, &self.surfaces, &self.values),
+            }
         }
-        if let (Some(axes), Some(view)) = (&self.axes, view)
-            && let Some(camera) = camera(axes, size, view)
-        {
-            self.draw_volume(&mut canvas, axes, &camera, opacity);
+        if let (Some(axes), Some(view)) = (&self.axes, view) {
+            self.draw_volumes(&mut canvas, axes, view, size, opacity);
         }
         canvas.taken
     }
@@ -105,8 +122,30 @@ impl Annotation {
     /// Draws the box and the axes, which are the same for all frames of a view, as if nothing lay in front of them.
     pub(crate) fn draw_still(&self, pixels: &mut [Rgb], size: [usize; 2], background: Rgb, view: &ViewReport) {
         let mut canvas = Canvas::new(pixels, size, background);
-        if let Some((axes, camera)) = self.axes.as_ref().and_then(|axes| Some((axes, camera(axes, size, view)?))) {
-            self.draw_volume(&mut canvas, axes, &camera, &|_| 0.0);
+        if let Some(axes) = &self.axes {
+            self.draw_volumes(&mut canvas, axes, view, size, &|_| 0.0);
+        }
+    }
+
+    /// The box and the axes of each panel, or of the only view.
+    fn draw_volumes(
+        &self,
+        canvas: &mut Canvas<'_>,
+        axes: &VolumeAxes,
+        view: &ViewReport,
+        size: [usize; 2],
+        opacity: &dyn Fn(usize) -> f64,
+    ) {
+        if self.panels.is_empty() {
+            let camera = camera(&axes.grid, size, view);
+            camera.iter().for_each(|camera| self.draw_volume(canvas, axes, camera, opacity));
+        }
+        for panel in &self.panels {
+            let Ok(camera) = Camera::new(&panel.view, &axes.grid) else { continue };
+            if self.parts.axes && has_axes(size) {
+                axes.write_place(canvas, &camera, panel);
+            }
+            self.draw_volume(canvas, axes, &camera, opacity);
         }
     }
 
@@ -179,49 +218,6 @@ impl Annotation {
         let title = self.placed_title(&letters, size[0] as f64, frame, None).filter(|_| has_time(size))?;
         Some(title.text).filter(|text| *text != self.title)
     }
-
-    /// The colour bar at the right, with its values to the left and their name to the right.
-    fn draw_bar(&self, canvas: &mut Canvas<'_>, scale: &Scale) {
-        let (size, [width, height]) = (canvas.letters.size, canvas.size());
-        let name = if self.values.is_empty() { 0.6 } else { 1.9 };
-        let thick = (1.1 * size).round();
-        let left = (width - name * size - thick).round();
-        let (top, length) = ((0.2 * height).max(2.5 * size).round(), (0.6 * height).round());
-        if top + length + size > height {
-            return;
-        }
-        let texts = canvas.taken.len();
-        let (x, y, w, h) = (left as i64, top as i64, thick as i64, length as i64);
-        let rim = (volume::THIN * size).round().max(1.0);
-        let edge = rim as i64;
-        canvas.fill([x - edge, y - edge], [w + 2 * edge, h + 2 * edge], canvas.ink);
-        for row in 0..h {
-            canvas.fill([x, y + row], [w, 1], scale.colour_at(1.0 - row as f64 / (h - 1).max(1) as f64));
-        }
-        let values = ticks::ticks(scale, ((length / (2.0 * size)) as usize).clamp(2, 8));
-        let room = (BAR - name - 2.3) * size;
-        for (text, value) in bar_texts(&canvas.letters, &values, room).into_iter().zip(values) {
-            let at = top + (1.0 - scale.share(value)) * (length - 1.0) + 0.5;
-            let half = canvas.letters.width(&text) / 2.0;
-            if 2.0 * half <= room && canvas.write(&text, [left - 0.8 * size - half, at]) {
-                canvas.line([left - rim - 0.4 * size, at], [left - rim, at], rim);
-            }
-        }
-        let name = shortened(&self.values, |text| canvas.letters.width(text) <= 0.9 * height);
-        let half = canvas.letters.width(&name) / 2.0;
-        let middle = (top + length / 2.0).clamp(half, (height - half).max(half));
-        canvas.write_upwards(&name, [width - 0.9 * size, middle]);
-        canvas.taken.truncate(texts);
-        canvas.taken.push([[width - BAR * size, top - size], [width, top + length + size]]);
-    }
-}
-
-/// The texts of a bar's values, in the form that has room.
-fn bar_texts(letters: &Letters, values: &[f64], room: f64) -> Vec<String> {
-    let texts = ticks::texts(values);
-    let with_power: Vec<String> = values.iter().map(|value| ticks::with_power(*value)).collect();
-    let width = |texts: &[String]| texts.iter().map(|text| letters.width(text)).fold(0.0, f64::max);
-    if width(&texts) > room && width(&with_power) < width(&texts) { with_power } else { texts }
 }
 
 /// From where a view is seen, in letters.
@@ -250,16 +246,15 @@ const SIDE: f64 = 0.6;
 const BOX: f64 = 0.6;
 
 /// The camera of a view.
-fn camera(axes: &VolumeAxes, size: [usize; 2], view: &ViewReport) -> Option<Camera> {
+pub(crate) fn camera(grid: &Grid, size: [usize; 2], view: &ViewReport) -> Option<Camera> {
     let &ViewReport { azimuth, elevation, roll, scale, center, .. } = view;
     let view = View { azimuth, elevation, roll, size, scale: Some(scale), center: Some(center) };
-    Camera::new(&view, &axes.grid).ok()
+    Camera::new(&view, grid).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use wavesplat_core::base::grid::Grid;
     use wavesplat_core::colour::{Norm, TransferFunction};
 
     fn scale(range: (f64, f64), norm: Norm) -> Scale {

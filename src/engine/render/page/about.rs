@@ -38,8 +38,15 @@ pub struct About {
     /// The time of each frame.
     pub(crate) labels: BTreeMap<usize, String>,
     pub(crate) sequences: Vec<Sequence>,
+    /// The picture of a sequence that is shown first.
+    pub(crate) opening: usize,
     /// The backdrop of each view, which lies behind its pictures, as the address of a PNG.
     pub(crate) backdrops: Vec<Option<String>>,
+    /// The lengths of the rays of each view, by which its values are weighed before they are coloured: shares of the longest one, as
+    /// the address of a PNG whose red and green are the high and the low byte.
+    pub(crate) shares: Vec<Option<String>>,
+    /// The value beyond the volume, with which values are weighed.
+    pub(crate) beyond: f32,
     /// How the pictures were made.
     pub(crate) settings: serde_json::Value,
 }
@@ -72,7 +79,10 @@ impl About {
             fps: 25.0,
             labels: BTreeMap::new(),
             sequences: Vec::new(),
+            opening: 0,
             backdrops: Vec::new(),
+            shares: Vec::new(),
+            beyond: 0.0,
             settings: serde_json::Value::Null,
         })
     }

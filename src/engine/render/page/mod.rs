@@ -5,9 +5,11 @@
 
 mod about;
 mod block;
+mod opening;
 
 pub use about::{About, Sequence};
 pub use block::Planes;
+pub use opening::{opening, spread};
 pub use {about::maps, block::headed};
 
 use base64::Engine;

@@ -5,36 +5,54 @@ use crate::render::batches::{SampleReader, SampledView, Scene};
 use crate::render::config::{Plane, RenderConfig, ViewTask};
 use crate::render::renderer::{Output, Renderer, give};
 use crate::render::report::{RenderReport, ViewReport};
-use wavesplat_core::base::error::Result;
+use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
+use wavesplat_core::view::camera::View;
 
 /// Renders planes through the volume. Progress counts pictures.
 pub(in crate::render) struct Planes {
-    views: Vec<PlanesView>,
+    /// The panels of each view's picture.
+    views: Vec<Vec<PlanesView>>,
 }
 
 impl Planes {
-    pub(in crate::render) fn new(grid: &Grid, config: &RenderConfig, planes: &[Plane]) -> Result<Self> {
+    pub(in crate::render) fn new(
+        grid: &Grid,
+        config: &RenderConfig,
+        planes: &[Plane],
+        panels: &[View],
+    ) -> Result<Self> {
         let clip = config.clip(grid)?;
-        let views = config.views.iter().map(|view| PlanesView::new(grid, clip, planes, view));
+        let side_by_side = || -> Result<Vec<PlanesView>> {
+            let alone = planes.iter().zip(panels);
+            alone.map(|(plane, panel)| PlanesView::new(grid, clip, std::slice::from_ref(plane), panel)).collect()
+        };
+        let views = config.views.iter().map(|view| match panels {
+            [] => Ok(vec![PlanesView::new(grid, clip, planes, view)?]),
+            panels if panels.len() == planes.len() && panels.iter().all(|panel| panel.size == view.size) => {
+                side_by_side()
+            }
+            _ => Err(Error::setting("planes", "takes a panel of the picture's size for each plane, or none")),
+        });
         Ok(Self { views: views.collect::<Result<_>>()? })
     }
 }
 
 impl Renderer for Planes {
     fn least_memory(&self, scene: &dyn Scene, config: &RenderConfig) -> usize {
-        let least =
-            |view: &PlanesView| SampledView { config, frame_bytes: &|frames| view.bytes(frames) }.least_memory(scene);
+        let least = |panels: &Vec<PlanesView>| {
+            SampledView { config, frame_bytes: &|frames| panels[0].bytes(frames) }.least_memory(scene)
+        };
         self.views.iter().map(least).max().unwrap_or(0)
     }
 
     fn reports(&self, config: &RenderConfig) -> Vec<ViewReport> {
         let none = f64::NAN;
-        let report = |(view, planes): (_, &PlanesView)| ViewReport {
+        let report = |(view, panels): (_, &Vec<PlanesView>)| ViewReport {
             method: "planes",
             stated_splat_error: none,
             expected_error: none,
-            ..ViewReport::new(view, &planes.camera)
+            ..ViewReport::new(view, &panels[0].camera)
         };
         config.views.iter().zip(&self.views).map(report).collect()
     }
@@ -46,11 +64,12 @@ impl Renderer for Planes {
     fn render(&self, scene: &mut dyn Scene, task: &ViewTask, output: &mut Output<'_, '_>) -> Result<()> {
         let Output { sink, report, progress } = output;
         for number in task.views.clone() {
-            let view = &self.views[number];
-            let config = RenderConfig { region: Some(view.needed()), ..task.config.clone() };
-            let sampled = SampledView { config: &config, frame_bytes: &|frames| view.bytes(frames) };
+            let panels = &self.views[number];
+            let needed = panels.iter().map(PlanesView::needed).reduce(|a, b| a.joined(&b));
+            let config = RenderConfig { region: needed, ..task.config.clone() };
+            let sampled = SampledView { config: &config, frame_bytes: &|frames| panels[0].bytes(frames) };
             let render =
-                |reader: &SampleReader<'_>, report: &mut RenderReport| PlanesPass { view, reader }.pictures(report);
+                |reader: &SampleReader<'_>, report: &mut RenderReport| PlanesPass { panels, reader }.pictures(report);
             sampled.render(scene, *progress, report, render, |frames, pictures, _| {
                 progress.advance(frames.len() as u64);
                 give(*sink, number, frames, &pictures)

@@ -9,11 +9,7 @@ impl PlanesView {
     /// The voxels that planes need: a box around all of them.
     pub(in crate::render) fn needed(&self) -> Region {
         let slabs = (0..self.planes.len()).map(|plane| self.slab(plane));
-        let joined = |a: Region, b: Region| Region {
-            start: std::array::from_fn(|i| a.start[i].min(b.start[i])),
-            end: std::array::from_fn(|i| a.end[i].max(b.end[i])),
-        };
-        slabs.reduce(joined).unwrap_or(self.clip)
+        slabs.reduce(|a, b| a.joined(&b)).unwrap_or(self.clip)
     }
 
     /// The voxels that a plane needs.

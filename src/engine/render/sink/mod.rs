@@ -7,6 +7,7 @@ mod movie;
 mod ours;
 mod page;
 mod provenance;
+mod ray_lengths;
 mod png;
 mod sheet;
 mod stream;
@@ -15,6 +16,7 @@ pub use movie::MovieFormat;
 pub use ours::is_ours;
 pub use page_encoder::{BlockOfFrames, PageEncoder};
 pub use provenance::{Provenance, Shows};
+pub use ray_lengths::{RayLengths, Weighing, weighed};
 
 use super::annotate::{Annotation, Finished};
 use super::batches::Scene;
@@ -25,6 +27,7 @@ use page::Page;
 use png::Animation;
 use rayon::prelude::*;
 use sheet::Sheet;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat_core::base::choice::Choice;
@@ -43,7 +46,7 @@ pub enum PictureFormat {
     /// One NumPy array for all pictures: float32 (frames, H, W) for values, (frames, H, W, 3) for colours and (frames,
     /// H, W, 4) for light; uint8 (frames, H, W, 3) if a coloured array is requested.
     Npy,
-    /// YUV4MPEG2, 4:4:4, full range: for video encoders and players.
+    /// YUV4MPEG2, full range, 4:2:0 or, if a side is odd, 4:4:4: for video encoders and players.
     Y4m,
     /// Raw frames: three bytes per pixel, no header.
     Rgb24,
@@ -162,6 +165,8 @@ pub struct SinkConfig {
     pub colours: Scale,
     /// Bits per colour channel in a PNG. Default: 8.
     pub depth: Depth,
+    /// How means are weighed before they are coloured. Default: not at all.
+    pub weighing: Option<Weighing>,
     /// Whether an array holds colours instead of values. Default: no.
     pub coloured_array: bool,
     /// Annotations drawn into coloured pictures. Default: none.
@@ -184,6 +189,7 @@ impl SinkConfig {
             pixel: if scene.channels() > 1 { Pixel::Channels } else { config.mode.pixel() },
             colours,
             depth: Depth::Eight,
+            weighing: None,
             coloured_array: false,
             annotation: None,
             force: false,
@@ -209,8 +215,21 @@ impl SinkConfig {
         }
     }
 
+    /// The numbers of a picture as they are coloured.
+    fn weighed<'p>(&self, rendered: &Rendered<'_>, picture: Picture<'p>) -> Cow<'p, [f32]> {
+        let view = rendered.views.get(rendered.view);
+        let Some((weighing, view)) = self.weighing.as_ref().zip(view) else { return picture.into() };
+        let shares = weighing.rays.shares(view, self.size);
+        picture.iter().zip(shares).map(|(mean, share)| weighing.value(*mean, share)).collect()
+    }
+
     /// A coloured picture with its annotations.
     fn image(&self, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<Rgb> {
+        let picture = &*self.weighed(rendered, picture);
+        self.annotated(rendered, picture)
+    }
+
+    fn annotated(&self, rendered: &Rendered<'_>, picture: &[f32]) -> Vec<Rgb> {
         let mut image = self.plain(picture);
         if let Some(annotation) = &self.annotation {
             let numbers = self.pixel.numbers();
@@ -236,10 +255,11 @@ impl SinkConfig {
 
     /// The same as [`Self::image`], with 16 bits per channel; annotations have 8.
     fn deep_image(&self, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<[u16; 3]> {
+        let picture = &*self.weighed(rendered, picture);
         let deep = |pixel| self.colours.exact_colour_of_pixel(pixel).map(|c| (c * 65535.0).round() as u16);
         let mut image: Vec<[u16; 3]> = picture.chunks_exact(self.pixel.numbers()).map(deep).collect();
         if self.annotation.is_some() {
-            let (plain, drawn) = (self.plain(picture), self.image(rendered, picture));
+            let (plain, drawn) = (self.plain(picture), self.annotated(rendered, picture));
             for (i, colour) in drawn.into_iter().enumerate().filter(|(i, colour)| plain[*i] != *colour) {
                 image[i] = colour.map(|c| u16::from(c) * 257);
             }

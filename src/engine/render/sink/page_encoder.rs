@@ -1,14 +1,14 @@
 //! Pictures as a web page takes them: a description, and blocks of pictures.
 
-use super::{Depth, Rendered, SinkConfig, png};
+use super::{Depth, Rendered, SinkConfig, Weighing, png};
 use crate::render::annotate::{Annotation, angles_of};
-use crate::render::page::{About, Planes, Sequence};
+use crate::render::page::{About, Planes, Sequence, opening, spread};
 use crate::render::{Picture, Pixel, ViewReport};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::colour::Norm;
+use wavesplat_core::colour::{Norm, Rgb};
 
 /// Most pictures of a block, and most bytes of their numbers.
 const PICTURES: usize = 32;
@@ -33,6 +33,8 @@ pub struct PageEncoder {
     waiting: Planes,
     /// How many pictures of each sequence are already in blocks.
     given: Vec<usize>,
+    /// How much there is to see in each picture of the first sequence.
+    spreads: Vec<f64>,
 }
 
 /// Which pictures a block has.
@@ -63,16 +65,19 @@ impl PageEncoder {
     pub fn new(config: SinkConfig) -> Result<Self> {
         let annotation = config.annotation.clone().unwrap_or_default();
         let about = About::new(config.pixel, config.size, &config.colours, &annotation)?;
+        let views = config.shown.iter().map(|(view, _)| view + 1).max().unwrap_or(0);
         let about = About {
             fps: config.fps,
             sequences: sequences(&config.shown),
-            backdrops: vec![None; config.shown.iter().map(|(view, _)| view + 1).max().unwrap_or(0)],
+            backdrops: vec![None; views],
+            shares: vec![None; views],
+            beyond: config.weighing.as_ref().map_or(0.0, |weighing| weighing.beyond),
             settings: serde_json::to_value(&*config.provenance).unwrap_or_default(),
             ..about
         };
         let about = about.with_times(&annotation);
         let (waiting, given) = (no_pictures(&config), vec![0; about.sequences.len()]);
-        Ok(Self { config, annotation, about, sequence: 0, waiting, given })
+        Ok(Self { config, annotation, about, sequence: 0, waiting, given, spreads: Vec::new() })
     }
 
     /// The description of the pictures, complete after the last one.
@@ -91,6 +96,9 @@ impl PageEncoder {
             self.sequence = sequence;
         }
         self.push(picture);
+        if sequence == 0 {
+            self.spreads.push(spread(picture));
+        }
         if self.waiting.pictures() == per_block(size_of_val(picture)) { self.rest(give) } else { Ok(()) }
     }
 
@@ -98,6 +106,7 @@ impl PageEncoder {
     pub fn rest(&mut self, give: &mut Give<'_>) -> Result<()> {
         let waiting = std::mem::replace(&mut self.waiting, no_pictures(&self.config));
         let (count, given) = (waiting.pictures(), &mut self.given);
+        self.about.opening = opening(&self.spreads, self.spreads.len() / 2);
         if count == 0 {
             return Ok(());
         }
@@ -123,6 +132,9 @@ impl PageEncoder {
         if self.about.backdrops[rendered.view].is_none() {
             self.about.backdrops[rendered.view] = self.backdrop(view)?;
         }
+        if self.about.shares[rendered.view].is_none() {
+            self.about.shares[rendered.view] = self.shares(view)?;
+        }
         Ok(())
     }
 
@@ -131,14 +143,29 @@ impl PageEncoder {
         let (size, background) = (self.config.size, self.config.colours.background());
         let mut pixels = vec![background; size[0] * size[1]];
         self.annotation.draw_still(&mut pixels, size, background, view);
-        if pixels.iter().all(|pixel| *pixel == background) {
-            return Ok(None);
-        }
-        let mut file = Vec::new();
+        let is_drawn = pixels.iter().any(|pixel| *pixel != background);
+        is_drawn.then(|| self.address(&pixels)).transpose()
+    }
+
+    /// The lengths of the rays of a view, as shares of the longest one: a PNG whose red and green are the high and the low byte.
+    fn shares(&self, view: &ViewReport) -> Result<Option<String>> {
+        let bytes = |share: f32| {
+            let [low, high] = ((65535.0 * share).round() as u16).to_le_bytes();
+            [high, low, 0]
+        };
+        let pixels = |weighing: &Weighing| -> Vec<Rgb> {
+            weighing.rays.shares(view, self.config.size).into_iter().map(bytes).collect()
+        };
+        self.config.weighing.as_ref().map(|weighing| self.address(&pixels(weighing))).transpose()
+    }
+
+    /// The address of a PNG that it contains whole.
+    fn address(&self, pixels: &[Rgb]) -> Result<String> {
         let eight = SinkConfig { depth: Depth::Eight, ..self.config.clone() };
-        let packed = png::write(&eight, size, &[], pixels.as_flattened(), &mut file);
-        packed.map_err(|e| Error::io(Path::new("page"), "packing what lies behind pictures", e))?;
-        Ok(Some(format!("data:image/png;base64,{}", BASE64.encode(file))))
+        let mut file = Vec::new();
+        let packed = png::write(&eight, self.config.size, &[], pixels.as_flattened(), &mut file);
+        packed.map_err(|e| Error::io(Path::new("page"), "packing a PNG", e))?;
+        Ok(format!("data:image/png;base64,{}", BASE64.encode(file)))
     }
 
     /// The step of codes, in the unit of the numbers.

@@ -70,6 +70,8 @@ pub struct Provenance {
     pub background: Option<String>,
     /// The least and the largest value that show the background.
     pub clear: Option<[f64; 2]>,
+    /// The value that short rays meet beyond the volume, if means are weighed by the lengths of rays.
+    pub beyond: Option<f64>,
     /// The parts drawn around the volume.
     pub annotate: Option<String>,
     /// The title drawn above the volume.

@@ -21,7 +21,8 @@ pub(super) fn begin(config: &SinkConfig, out: &mut impl Write) -> io::Result<()>
         }
         PictureFormat::Y4m => {
             let [frames, seconds] = config.frames_and_seconds();
-            writeln!(out, "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C444 XCOLORRANGE=FULL")
+            let chroma = if has_half_chroma(config.size) { "420jpeg" } else { "444" };
+            writeln!(out, "YUV4MPEG2 W{width} H{height} F{frames}:{seconds} Ip A1:1 C{chroma} XCOLORRANGE=FULL")
         }
         _ => Ok(()),
     }
@@ -38,9 +39,9 @@ pub(super) fn write(
         PictureFormat::Npy if !config.coloured_array => write_numbers(picture, f32::to_le_bytes, out),
         PictureFormat::Gray16 => {
             let level = |v: f32| ((config.colours.share(v) * 65535.0).round() as u16).to_le_bytes();
-            write_numbers(picture, level, out)
+            write_numbers(&config.weighed(rendered, picture), level, out)
         }
-        PictureFormat::Y4m => write_yuv(config.image(rendered, picture), out),
+        PictureFormat::Y4m => write_yuv(config.image(rendered, picture), config.size, out),
         PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) | PictureFormat::Page => {
             out.write_all(config.image(rendered, picture).as_flattened())
         }
@@ -68,10 +69,29 @@ fn write_numbers<const N: usize>(
 /// Numbers that are written together.
 const SOME: usize = 1 << 14;
 
-fn write_yuv(mut pixels: Vec<Rgb>, out: &mut impl Write) -> io::Result<()> {
+/// Whether the colours of a stream have half of the resolution: what every player shows, but only sizes that are even have it.
+fn has_half_chroma([width, height]: [usize; 2]) -> bool {
+    width % 2 == 0 && height % 2 == 0
+}
+
+fn write_yuv(mut pixels: Vec<Rgb>, size: [usize; 2], out: &mut impl Write) -> io::Result<()> {
     writeln!(out, "FRAME")?;
     pixels.iter_mut().for_each(|pixel| *pixel = yuv(*pixel));
-    (0..3).try_for_each(|plane| out.write_all(&pixels.iter().map(|p| p[plane]).collect::<Vec<u8>>()))
+    let plane = |n: usize| pixels.iter().map(|pixel| pixel[n]).collect::<Vec<u8>>();
+    out.write_all(&plane(0))?;
+    let chroma = |n: usize| if has_half_chroma(size) { halved(&plane(n), size[0]) } else { plane(n) };
+    out.write_all(&chroma(1))?;
+    out.write_all(&chroma(2))
+}
+
+/// The mean of every two by two bytes of a plane with rows of `width` bytes; width and height are even.
+fn halved(plane: &[u8], width: usize) -> Vec<u8> {
+    let rows = plane.chunks_exact(2 * width).map(|two| two.split_at(width));
+    let mean = |(above, below): (&[u8], &[u8])| {
+        let sum = above.iter().chain(below).map(|byte| u16::from(*byte)).sum::<u16>();
+        ((sum + 2) / 4) as u8
+    };
+    rows.flat_map(|(above, below)| above.chunks_exact(2).zip(below.chunks_exact(2)).map(mean)).collect()
 }
 
 /// Full-range BT.601, the default of players for streams without colour information.
@@ -85,6 +105,11 @@ fn yuv([r, g, b]: [u8; 3]) -> [u8; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn halved_planes_have_the_means_of_four() {
+        assert_eq!(halved(&[0, 1, 9, 9, 2, 1, 8, 9], 4), [1, 9]);
+    }
 
     #[test]
     fn grey_has_no_chroma() {

@@ -54,7 +54,6 @@ impl Blend for Composite {
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is at least the largest transmittance of a group.
     const OPEN: f32 = GROUP as f32;
-    const LEAST: f32 = super::LEAST;
 
     fn units(&self, _: f64) -> Units {
         self.table.units

@@ -153,7 +153,6 @@ impl Blend for Certificate<'_> {
     const EMPTY: Bounded = Bounded::START;
     const NOTHING: [f32; 4] = [0.0; 4];
     const OPEN: f32 = Composite::OPEN;
-    const LEAST: f32 = Composite::LEAST;
     const NUMBERS: usize = 1;
 
     fn units(&self, middle: f64) -> Units {

@@ -80,7 +80,11 @@ impl Blend for Isosurfaces {
     const NOTHING: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
     /// The limit is the largest transmittance of a group.
     const OPEN: f32 = 1.0;
-    const LEAST: f32 = 0.01;
+
+    /// Where hardly any sample supports a value, there is no surface.
+    fn least(&self) -> f32 {
+        0.01
+    }
 
     fn units(&self, _: f64) -> Units {
         self.units

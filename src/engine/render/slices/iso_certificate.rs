@@ -290,8 +290,11 @@ impl Blend for IsoCertificate<'_> {
     const EMPTY: Bounded = Bounded::START;
     const NOTHING: [f32; 4] = [0.0; 4];
     const OPEN: f32 = Isosurfaces::OPEN;
-    const LEAST: f32 = Isosurfaces::LEAST;
     const NUMBERS: usize = 1;
+
+    fn least(&self) -> f32 {
+        self.surfaces.least()
+    }
 
     fn units(&self, middle: f64) -> Units {
         self.surfaces.units(middle)

@@ -4,11 +4,25 @@
 use super::GROUP;
 use super::filter::Sixteen;
 use super::row::{Blend, Point, Row, RowGroups};
+use super::view::SlicedView;
 use crate::render::batches::Units;
 use wavesplat_core::base::vectors::dispatch;
 
 /// The maximum along the ray.
-pub(in crate::render) struct Largest;
+pub(in crate::render) struct Largest {
+    /// Where the density is less, there is nothing.
+    least: f32,
+}
+
+/// The least density, as a share of that in the middle. It falls to a half at the faces of the volume.
+const NEAR: f64 = 0.4;
+
+impl Largest {
+    /// The largest values within the volume of a view.
+    pub(in crate::render) fn new(view: &SlicedView) -> Self {
+        Self { least: (NEAR * view.full_density()) as f32 }
+    }
+}
 
 /// Sixteen cells.
 #[derive(Debug, Clone, Copy)]
@@ -34,14 +48,16 @@ impl Blend for Largest {
     /// The limit is the least of a group's largest values.
     const OPEN: f32 = NONE;
     const OVER: f32 = f32::INFINITY;
-    /// A value that hardly any sample supports is not taken for the largest.
-    const LEAST: f32 = 0.01;
     const CENTRED: bool = true;
     const NUMBERS: usize = 1;
 
     fn units(&self, middle: f64) -> Units {
         // Differences of the largest 32-bit numbers do not overflow.
         Units { zero: middle, per: 1.0 / 16.0 }
+    }
+
+    fn least(&self) -> f32 {
+        self.least
     }
 
     fn shows(&self, range: (f32, f32)) -> bool {
@@ -91,7 +107,7 @@ impl Blend for Largest {
     }
 
     fn step(&self, largest: &mut f64, point: &Point, _: f64) {
-        if point.density >= f64::from(Self::LEAST) {
+        if point.density >= f64::from(self.least) {
             *largest = largest.max(point.value);
         }
     }

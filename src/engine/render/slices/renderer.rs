@@ -121,7 +121,9 @@ impl<'a, B: Blend> Sliced<'a, B> {
             let pass = SlicePass { number, view, blend, stops, reader };
             let swept = pass.sweep(report)?;
             let errors = self.certifier.as_ref().map(|certifier| (certifier.errors)(&pass, &swept, report));
-            let planes = behind.as_ref().map(|behind| PlanesPass { view: &behind.planes, reader }.pictures(report));
+            let planes = behind
+                .as_ref()
+                .map(|behind| PlanesPass { panels: std::slice::from_ref(&behind.planes), reader }.pictures(report));
             Ok(Drawn { swept, planes: planes.transpose()?, errors: errors.transpose()? })
         };
         let give = |frames: &[usize], Drawn { swept, planes, errors }: Drawn<B>, report: &mut RenderReport| {

@@ -1,7 +1,7 @@
 //! A row of cells in a slice: means and lengths, sixteen cells at a time, and the ways to combine the slices.
 
 use super::filter::{Sixteen, weighted_rows};
-use super::{GROUP, stops};
+use super::{GROUP, LEAST, stops};
 use crate::render::batches::Units;
 
 /// Sums along a and b of a row of cells, from the first row of voxels on that the weights along c meet.
@@ -205,13 +205,16 @@ pub(in crate::render) trait Blend: Sync {
     const OVER: f32 = 0.0;
     /// Whether units depend on a value near those of the frame.
     const CENTRED: bool = false;
-    /// Where the density is less, there is nothing.
-    const LEAST: f32;
     /// Numbers per pixel.
     const NUMBERS: usize = 4;
 
     /// The units of values. `middle` is a value near those of the frame.
     fn units(&self, middle: f64) -> Units;
+
+    /// Where the density is less, there is nothing.
+    fn least(&self) -> f32 {
+        LEAST
+    }
 
     /// Whether the gradient of the field is needed.
     fn is_shaded(&self) -> bool {

@@ -318,7 +318,7 @@ impl<B: Blend> Band<'_, B> {
                     let stops = self.stops.get(groups.clone()).unwrap_or_default();
                     let last = self.last.get_mut(groups).unwrap_or_default();
                     let sums = &self.scratch.along_b[phase];
-                    let row = Row { least: B::LEAST, stops, ..meets.row(view, part, near, sums, across) };
+                    let row = Row { least: self.blend.least(), stops, ..meets.row(view, part, near, sums, across) };
                     self.blend.add(&row, RowGroups { states, limits, live, last });
                 }
             }

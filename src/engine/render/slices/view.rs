@@ -122,7 +122,7 @@ impl SlicedView {
         let camera = Camera::new(view, grid)?;
         let shear = Shear::new(&camera, grid, 1);
         let (start, count) = along(&clip, shear.axes);
-        let sigma = shear.axes.map(|axis| config.kernel.sigma / grid.spacing[axis]);
+        let sigma = shear.axes.map(|axis| config.kernel.sigma_in_voxels(grid, axis));
         Footprint::new(config.kernel, grid, camera.scale, Method::EXACT)?; // weights are numbers
         if sigma.iter().any(|sigma| sigma * CUT > MOST_REACH) {
             return Err(too_wide());
@@ -294,6 +294,15 @@ impl SlicedView {
             middle.filling = slices.iter().map(density).sum::<f64>() / (self.parts as f64 * density(&middle));
         }
         (is_met || !slices.is_empty()).then_some(Slab { middle, slices, is_met })
+    }
+
+    /// The density in the middle of the region: the largest one, unless samples are missing.
+    pub(super) fn full_density(&self) -> f64 {
+        let along = |i: usize| {
+            let taps = Taps::new((self.count[i] as f64 - 1.0) / 2.0, self.sigma[i]);
+            f64::from(taps.presence(0, self.count[i])) * taps.density
+        };
+        (0..3).map(along).product()
     }
 
     /// The slice at a position along a.

@@ -7,8 +7,10 @@ use crate::picture::request::PictureRequest;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::base::time_labels::TimeLabels;
-use wavesplat_engine::render::annotate::{Annotation, AxisLabels, Margins, Parts, VolumeAxes, margins};
-use wavesplat_engine::render::{Mode, RenderConfig};
+use wavesplat_core::view::camera::View;
+use wavesplat_core::view::footprint::Kernel;
+use wavesplat_engine::render::annotate::{Annotation, AxisLabels, Margins, Panel, Parts, VolumeAxes, margins};
+use wavesplat_engine::render::{Mode, Plane, RenderConfig, Surface};
 
 /// The parts that are drawn into pictures. A web page itself has a title, a colour bar and the time.
 fn drawn_parts(request: &PictureRequest) -> Parts {
@@ -30,7 +32,28 @@ pub(in crate::picture) fn annotation(request: &PictureRequest, values: String, t
         values: request.bar_title.clone().unwrap_or(values),
         times,
         axes: None,
+        surfaces: Vec::new(),
+        panels: Vec::new(),
     }
+}
+
+/// The isosurfaces of a mode, which pictures list.
+pub(in crate::picture) fn surfaces_of(mode: &Mode) -> Vec<Surface> {
+    match mode {
+        Mode::Iso { surfaces, .. } => surfaces.clone(),
+        _ => Vec::new(),
+    }
+}
+
+/// The slices that share each picture of a mode. Planes are in voxels of a level of detail.
+pub(in crate::picture) fn panels_of(mode: &Mode, lod: u32) -> Vec<Panel> {
+    let Mode::Planes { planes, panels } = mode else { return Vec::new() };
+    let panel = |(plane, view): (&Plane, &View)| Panel {
+        view: *view,
+        axis: plane.axis,
+        at: plane.at * f64::from(1_u32 << lod),
+    };
+    planes.iter().zip(panels).map(panel).collect()
 }
 
 /// Says how much of a long title pictures show.
@@ -67,9 +90,14 @@ pub(in crate::picture) fn axes_of_region(
     exaggeration: f64,
 ) -> VolumeAxes {
     let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. });
-    let rim = if has_kernel { (SEEN * config.kernel.sigma - whole.largest_spacing() / 2.0).max(0.0) } else { 0.0 };
+    let rim = if has_kernel { rim(&config.kernel, whole) } else { 0.0 };
     let compares = labels[..2].iter().any(|across| across.compares_with(&labels[2]));
     VolumeAxes { grid: *whole, region, rim, exaggeration: if compares { exaggeration } else { 1.0 }, labels }
+}
+
+/// How far beyond the box of a grid its kernels are seen, in world units.
+pub(in crate::picture) fn rim(kernel: &Kernel, grid: &Grid) -> f64 {
+    (SEEN * kernel.sigma - grid.largest_spacing() / 2.0).max(0.0)
 }
 
 /// Says if a scale that is asked for cannot be drawn.

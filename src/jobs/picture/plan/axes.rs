@@ -75,6 +75,16 @@ impl Axes {
         labels[a].compares_with(&labels[b])
     }
 
+    /// The sides of a patient at the first and the last voxel of an axis, if they are known.
+    pub(crate) fn sides(&self, axis: usize) -> Option<[char; 2]> {
+        self.0[axis].sides
+    }
+
+    /// Whether the volume is of a body.
+    pub(crate) fn is_of_body(&self) -> bool {
+        self.0.iter().any(|axis| axis.sides.is_some())
+    }
+
     /// The name of an axis.
     pub(crate) fn name(&self, axis: usize) -> &str {
         &self.0[axis].names[0]

@@ -2,13 +2,13 @@
 
 use super::modes;
 use super::planes::{planes_of, with_planes};
-use super::ranges::{self, Needed, Ranges};
+use super::ranges::{self, Needed, Ranges, is_of_means};
 use super::targets::Targets;
 use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
 use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
-use crate::picture::values::{ModeName, Theme};
+use crate::picture::values::{BeyondSpec, ModeName, Theme};
 use serde::Serialize;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
@@ -24,6 +24,8 @@ pub(in crate::picture) struct Colouring {
     pub(in crate::picture) map: TransferFunction,
     pub(in crate::picture) picture_scale: Scale,
     pub(in crate::picture) error_scale: Scale,
+    /// The value beyond the volume, if means are weighed with it.
+    pub(in crate::picture) beyond: Option<f64>,
     /// Whether pictures are in colours.
     in_colours: bool,
     /// Whether pictures of errors are.
@@ -56,6 +58,10 @@ pub(in crate::picture) struct ColouringInput<'a> {
     pub(in crate::picture) errors: Option<&'a Targets>,
     /// The colours of samples.
     pub(in crate::picture) colours: Option<&'a TransferFunction>,
+    /// Whether the volume is of a body: greys are usual.
+    pub(in crate::picture) is_of_body: bool,
+    /// The least sample of the source, if it is known.
+    pub(in crate::picture) least: Option<f64>,
 }
 
 impl ColouringInput<'_> {
@@ -71,16 +77,33 @@ impl ColouringInput<'_> {
         let errors_in_colours = self.errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel);
         let is_clear = self.may_be_clear(pixel) && finds_clear(request);
-        let ranges =
-            ranges(Needed { pictures: in_colours && (fixed.is_none() || is_clear), errors: errors_in_colours })?;
+        let beyond = if in_colours { self.beyond(pixel) } else { BeyondSpec::Nothing };
+        let finds = fixed.is_none() || is_clear || beyond == BeyondSpec::Auto;
+        let needed = Needed { pictures: in_colours && finds, beyond, errors: errors_in_colours };
+        let mut ranges = ranges(needed)?;
+        ranges.is_of_tissue = self.is_of_body;
+        let beyond = match beyond {
+            BeyondSpec::Value(value) => Some(value),
+            BeyondSpec::Auto | BeyondSpec::Nothing => ranges.beyond,
+        };
         let sample_colours = self.colours.filter(|_| pixel != Pixel::Value);
-        let map = sample_colours.map_or_else(|| value_colours(request), |colours| Ok(colours.clone()))?;
+        let map =
+            sample_colours.map_or_else(|| value_colours(request, self.is_of_body), |colours| Ok(colours.clone()))?;
         let (range, norm) = match pixel {
-            Pixel::Value => value_spread(request, &map, &ranges, in_colours, reporter)?,
+            Pixel::Value => value_spread(request, &map, &ranges, self.least, in_colours, reporter)?,
             _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
         };
-        let found = Needed { pictures: in_colours && fixed.is_none(), errors: errors_in_colours };
-        report_ranges(range, &ranges, found, reporter);
+        if (in_colours && fixed.is_none()) || errors_in_colours {
+            reporter.detail(format_args!("colours from {:.4e} to {:.4e}; `range` sets them", range.0, range.1));
+        }
+        if errors_in_colours {
+            reporter.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
+        }
+        if let Some(beyond) = beyond {
+            reporter.detail(format_args!(
+                "short rays are taken for as long as the longest, with {beyond:.4e} beyond the volume; `beyond` none shows plain means"
+            ));
+        }
         let scale = |range, norm| Scale::new(&map, range, norm, background(request));
         // Where no ray meets anything, a composite has no error, and shows the background.
         let clear = (pixel == Pixel::Light).then_some(Clear { lo: 0.0, hi: 0.0, fade: 0.0 });
@@ -89,7 +112,13 @@ impl ColouringInput<'_> {
         let may_be_clear = in_colours && self.may_be_clear(pixel);
         let clear = may_be_clear.then(|| clear_values(request, &ranges, range, reporter)).flatten();
         let picture_scale = picture_scale.with_clear(clear);
-        Ok(Colouring { pixel, map, picture_scale, error_scale, in_colours, errors_in_colours })
+        Ok(Colouring { pixel, map, picture_scale, error_scale, beyond, in_colours, errors_in_colours })
+    }
+
+    /// The value beyond the volume, with which means are weighed. A logarithm is of plain means.
+    fn beyond(&self, pixel: Pixel) -> BeyondSpec {
+        let weighs = pixel == Pixel::Value && is_of_means(self.config) && self.request.norm == Norm::Linear;
+        if weighs { self.request.beyond } else { BeyondSpec::Nothing }
     }
 
     /// Whether some values may show the background. Slices show them all.
@@ -136,15 +165,6 @@ fn background(request: &PictureRequest) -> Rgb {
     request.background.map_or(theme_colour, |colour| colour.0)
 }
 
-fn report_ranges((lo, hi): (f64, f64), ranges: &Ranges, found: Needed, reporter: &dyn Reporter) {
-    if found.pictures || found.errors {
-        reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
-    }
-    if found.errors {
-        reporter.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
-    }
-}
-
 /// The colours of a composite or of surfaces. A range that is not given ends at the largest value of small pictures.
 /// Opacities that are not given are suggested from an overview of the samples.
 pub(in crate::picture) fn automatic_colours(
@@ -161,7 +181,7 @@ pub(in crate::picture) fn automatic_colours(
     }
     let mut overview = None;
     if modes::has_automatic_range(request)? {
-        let needed = Needed { pictures: true, errors: false };
+        let needed = Needed { pictures: true, beyond: BeyondSpec::Nothing, errors: false };
         let ranges = Ranges::small(scene, config, needed, reporter)?;
         colours = ranges.stretch(&colours)?;
         overview = ranges.into_overview();

@@ -79,7 +79,7 @@ fn allowed_error(request: &PictureRequest, tolerance: f64, file: Option<&Metadat
         return Err(Error::setting("tolerance", "leaves out coefficients, so it needs `method` coefficients"));
     };
     if !(0.0..=1.0).contains(&tolerance) {
-        return Err(Error::setting("tolerance", "a share of the value range, 0 to 1; 2 % is 0.02"));
+        return Err(Error::setting("tolerance", "a share of the value range, 0 to 1, like 0.02 or 2%"));
     }
     let range = range_of_shares(file);
     let allowed = range_bound(tolerance, range);

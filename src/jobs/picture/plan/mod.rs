@@ -9,12 +9,14 @@ pub(super) mod targets;
 pub(super) mod annotations;
 mod camera_path;
 mod views;
+mod panels;
 mod planes;
 pub(super) mod config;
 pub(super) mod ranges;
 mod value_colours;
 pub(super) mod colouring;
 pub(super) mod opened;
+pub(super) mod opening;
 pub(super) mod provenance;
 mod speed;
 pub(super) mod sinks;
@@ -22,7 +24,7 @@ pub(super) mod sinks;
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::session::Session;
-use annotations::{note_scale, note_title, volume_axes};
+use annotations::{note_scale, note_title, panels_of, surfaces_of, volume_axes};
 use colouring::{Colouring, ColouringInput, automatic_colours, note_surfaces};
 use config::render_config;
 use modes::check_slices;
@@ -73,6 +75,8 @@ impl Plan {
             pictures: &targets.pictures,
             errors: targets.errors.as_ref(),
             colours: colours.as_ref(),
+            is_of_body: axes.is_of_body(),
+            least: file.as_ref().map(|file| file.source_range().0).filter(|least| least.is_finite()),
         };
         let colouring = input.colouring(|needed| Ranges::small(scene.as_mut(), &config, needed, reporter), reporter)?;
         let provenance = Provenance {
@@ -80,8 +84,12 @@ impl Plan {
             exaggerate: Some(exaggeration).filter(|factor| *factor != 1.0),
             ..provenance(request, scene.grid(), &config, file.as_deref(), &annotation.times, &colouring)
         };
-        let annotation =
-            Annotation { axes: Some(volume_axes(request, &axes, &whole, &config, exaggeration)?), ..annotation };
+        let annotation = Annotation {
+            axes: Some(volume_axes(request, &axes, &whole, &config, exaggeration)?),
+            surfaces: surfaces_of(&config.mode),
+            panels: panels_of(&config.mode, lod),
+            ..annotation
+        };
         note_scale(&annotation, reporter);
         note_title(request, &annotation, &config, reporter);
         Ok(Self { scene, file, config, targets, colouring, provenance, annotation })
@@ -89,7 +97,7 @@ impl Plan {
 
     /// The input of the sinks of the pictures.
     pub(super) fn sinks<'a>(&'a self, request: &'a PictureRequest) -> SinkInput<'a> {
-        let Self { config, targets, colouring, provenance, annotation, .. } = self;
-        SinkInput { request, config, targets, colouring, provenance, annotation }
+        let Self { scene, config, targets, colouring, provenance, annotation, .. } = self;
+        SinkInput { request, grid: scene.grid(), config, targets, colouring, provenance, annotation }
     }
 }

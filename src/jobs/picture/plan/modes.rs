@@ -135,7 +135,9 @@ pub(in crate::picture) fn mode(request: &PictureRequest, colours: Option<&Transf
         ModeName::Composite => {
             let transfer = needed(colours)?;
             let transfer = match &request.opacity {
-                Some(Opacities::Points(points)) => transfer.with_opacity(&points.0),
+                Some(Opacities::Points(points)) => {
+                    points.at_shares(transfer.range()).and_then(|points| transfer.with_opacity(&points))
+                }
                 Some(Opacities::Auto) | None => Ok(transfer.clone()),
             };
             let transfer = transfer.map_err(|what| Error::setting("opacity", what))?;
@@ -148,7 +150,7 @@ pub(in crate::picture) fn mode(request: &PictureRequest, colours: Option<&Transf
             let surfaces = list.surfaces(needed(colours)?, request.transfer_function.is_some());
             Mode::Iso { surfaces, light: lamp(request), slices }
         }
-        ModeName::Slice => Mode::Planes { planes: Vec::new() },
+        ModeName::Slice => Mode::Planes { planes: Vec::new(), panels: Vec::new() },
     })
 }
 

@@ -5,8 +5,8 @@ use super::axes::Axes;
 use super::config::frames_of;
 use super::modes;
 use super::named_colours::colours_of_source;
-use super::units::values_of;
-use super::views::{face_on, views};
+use super::units::{values_of, values_of_archive};
+use super::views::{face_on, has_own_view, views};
 use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
@@ -89,7 +89,7 @@ impl Opened {
         refuse_for_frames(session, request)?;
         modes::check(request, true)?;
         let mut source = session.open_frames(reporter)?;
-        let annotation = annotation(request, String::new(), source.archive().time_labels());
+        let annotation = annotation(request, values_of_archive(source.archive()), source.archive().time_labels());
         let missing_value = source.archive().missing_value(request.missing_value);
         let colours = match modes::sample_colours(request) {
             Some(name) => {
@@ -137,7 +137,8 @@ fn height_of_section(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Resu
     /// The height as a share of the width.
     const SHAPE: f64 = 0.6;
     let is_placed = request.scale.is_some() || request.center.is_some();
-    if is_placed || grid.dims[2] == 1 || face_on(request, axes, grid)?.is_none() {
+    let are_panels = request.slice.len() == 3 && !has_own_view(request);
+    if is_placed || grid.dims[2] == 1 || !are_panels && face_on(request, axes, grid)?.is_none() {
         return Ok(None);
     }
     let across = section_across(request, axes)?;
@@ -150,7 +151,8 @@ fn height_of_section(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Resu
 /// The axis to the right in a section seen face-on; 2 if it has no heights.
 fn section_across(request: &PictureRequest, axes: &Axes) -> Result<usize> {
     let cut = request.slice.first().map(|slice| axes.find("slice", &slice.axis)).transpose()?;
-    Ok(match cut {
+    Ok(match cut.filter(|_| request.slice.len() == 1) {
+        None => 0, // the widest of several
         Some(0) => 1,
         Some(1) => 0,
         _ => 2,

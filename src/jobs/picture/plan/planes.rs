@@ -13,7 +13,7 @@ const FIELD: &str = "slice";
 /// The planes of a mode.
 pub(in crate::picture) fn planes_of(mode: &Mode) -> Vec<Plane> {
     match mode {
-        Mode::Composite { planes, .. } | Mode::Planes { planes } => planes.clone(),
+        Mode::Composite { planes, .. } | Mode::Planes { planes, .. } => planes.clone(),
         Mode::Projection | Mode::Iso { .. } | Mode::Mip { .. } => Vec::new(),
     }
 }
@@ -24,7 +24,7 @@ pub(in crate::picture) fn with_planes(mode: Mode, planes: Vec<Plane>) -> Mode {
         Mode::Composite { transfer, unit, slices, light, .. } => {
             Mode::Composite { transfer, unit, slices, light, planes }
         }
-        Mode::Planes { .. } => Mode::Planes { planes },
+        Mode::Planes { panels, .. } => Mode::Planes { planes, panels },
         other => other,
     }
 }
@@ -64,6 +64,9 @@ pub(in crate::picture) fn set_planes(
         return Err(Error::setting(FIELD, format!("{at} is outside of `region`")));
     }
     config.mode = with_planes(config.mode.clone(), planes);
+    if let Mode::Planes { planes, panels } = &mut config.mode {
+        *panels = super::panels::panels(request, axes, whole, planes)?;
+    }
     Ok(())
 }
 

@@ -116,6 +116,7 @@ fn in_colours(provenance: Provenance, colouring: &Colouring, scale: &Scale) -> P
         norm: Some(scale.norm().name()),
         background: Some(HexColour(scale.background()).to_string()),
         clear: scale.clear().map(|clear| [clear.lo, clear.hi]),
+        beyond: colouring.beyond,
         ..provenance
     }
 }
@@ -129,10 +130,11 @@ pub(in crate::picture) fn error_provenance(provenance: &Provenance, colouring: &
         norm: None,
         background: None,
         clear: None,
+        beyond: None,
         ..provenance.clone()
     };
     match colouring.coloured().error_range {
-        Some(_) => in_colours(provenance, colouring, &colouring.error_scale),
+        Some(_) => Provenance { beyond: None, ..in_colours(provenance, colouring, &colouring.error_scale) },
         None => provenance,
     }
 }

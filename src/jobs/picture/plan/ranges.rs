@@ -1,8 +1,10 @@
 //! The default range of colours, taken from small pictures of an overview.
 
+use super::annotations::rim;
 use super::modes::unit;
 use crate::picture::distributions::{Distributions, Sampled};
 use crate::picture::reporter::Reporter;
+use crate::picture::values::BeyondSpec;
 use std::sync::Arc;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::{Grid, Region};
@@ -11,7 +13,10 @@ use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::colour::{Clear, Common, Distribution, Norm, TransferFunction};
 use wavesplat_core::source::ArraySource;
 use wavesplat_core::view::footprint::Kernel;
-use wavesplat_engine::render::{FrameScene, Mode, OverviewRequest, RenderConfig, RenderReport, Scene, Thinning};
+use wavesplat_engine::render::sink::{RayLengths, weighed};
+use wavesplat_engine::render::{
+    FrameScene, Mode, OverviewRequest, Quantity, RenderConfig, RenderReport, Rendered, Scene, Thinning,
+};
 use wavesplat_engine::render::{check, render, stride};
 
 /// The largest number of pixels used to find a range.
@@ -130,6 +135,17 @@ fn robust_range(values: &[f32]) -> (f64, f64) {
     (clipped(lo, low), clipped(hi, high))
 }
 
+/// The end of a range for tissue: few of the ascending values that are not near those of air are brighter. `None` if there are too few.
+fn tissue_end(values: &[f32]) -> Option<f64> {
+    /// The share of values that are not brighter, and that of its distance from the least value up to which it is air.
+    const MOST: f64 = 0.98;
+    const AIR: f64 = 0.1;
+    let at = |values: &[f32], share: f64| values.get((share * values.len() as f64) as usize).map(|v| f64::from(*v));
+    let (least, most) = (at(values, 0.01)?, at(values, MOST)?);
+    let air = values.partition_point(|value| f64::from(*value) <= least + AIR * (most - least));
+    at(&values[air..], MOST).filter(|end| *end > least)
+}
+
 /// The settings of small pictures.
 fn small(config: &RenderConfig) -> RenderConfig {
     let views = spread_over(config.views.len(), MOST_VIEWS).into_iter().map(|view| config.views[view]).collect();
@@ -163,7 +179,7 @@ fn spread(scene: &dyn Scene, count: usize) -> Vec<usize> {
 }
 
 /// At most `count` of the numbers below `all`, from the first to the last.
-fn spread_over(all: usize, count: usize) -> Vec<usize> {
+pub(super) fn spread_over(all: usize, count: usize) -> Vec<usize> {
     let mut chosen: Vec<usize> = (0..count).map(|i| i * all.saturating_sub(1) / (count - 1)).collect();
     chosen.dedup();
     chosen
@@ -184,26 +200,26 @@ fn progress<'a>(stage: &'static str, small: &RenderConfig, reporter: &'a dyn Rep
     reporter.progress(stage, unit(&small.mode))
 }
 
-/// The values of small pictures of a few frames.
-fn values_of_frames(scene: &mut dyn Scene, small: &RenderConfig, reporter: &dyn Reporter) -> Result<Vec<f32>> {
+/// The pixels of small pictures of a few frames.
+fn pixels_of_frames(scene: &mut dyn Scene, small: &RenderConfig, reporter: &dyn Reporter) -> Result<Pixels> {
     let frames = spread(scene, frames_of(scene.grid().dims.iter().product(), small));
-    let mut values = Vec::new();
+    let mut pixels = Pixels::default();
     pictures(
         scene,
         &RenderConfig { frames, ..small.clone() },
         progress("range", small, reporter).as_ref(),
-        &mut values,
+        &mut pixels,
     )?;
-    Ok(values)
+    Ok(pixels)
 }
 
-/// The values of small pictures of an overview, and the overview; none if the scene has none, or the volume is too small for
+/// The pixels of small pictures of an overview, and the overview; none if the scene has none, or the volume is too small for
 /// one.
-fn values_of_overview(
+fn pixels_of_overview(
     scene: &mut dyn Scene,
     small: &RenderConfig,
     reporter: &dyn Reporter,
-) -> Result<Option<(Vec<f32>, Overview)>> {
+) -> Result<Option<(Pixels, Overview)>> {
     if matches!(small.mode, Mode::Planes { .. }) {
         return Ok(None);
     }
@@ -217,19 +233,19 @@ fn values_of_overview(
     let Some(overview) = scene.overview(&request, reporter.progress("overview", "steps").as_ref())? else {
         return Ok(None);
     };
-    let (grid, mut values) = (thinning.grid(scene.grid()), Vec::new());
+    let (grid, mut pixels) = (thinning.grid(scene.grid()), Pixels::default());
     let config = overview_config(&request, &grid, small, size_of_val(&overview[..]));
     for samples in overview.chunks_exact(request.samples()) {
         let bytes = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
         let mut frames = FrameScene::new(Box::new(ArraySource::new(grid, SampleType::F32, bytes)?), None);
         // One bar for each channel would look like a restart.
         match scene.channels() {
-            1 => pictures(&mut frames, &config, progress("range", small, reporter).as_ref(), &mut values)?,
-            _ => pictures(&mut frames, &config, &Silent, &mut values)?,
+            1 => pictures(&mut frames, &config, progress("range", small, reporter).as_ref(), &mut pixels)?,
+            _ => pictures(&mut frames, &config, &Silent, &mut pixels)?,
         };
     }
     let stride = thinning.stride;
-    Ok(Some((values, Overview { stride, frames, samples: overview })))
+    Ok(Some((pixels, Overview { stride, frames, samples: overview })))
 }
 
 /// How to thin a scene for small pictures.
@@ -248,7 +264,7 @@ fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
 fn overview_config(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig, bytes: usize) -> RenderConfig {
     let sigma = small.kernel.sigma.max(SIGMA * grid.largest_spacing());
     RenderConfig {
-        kernel: Kernel { sigma, ..small.kernel },
+        kernel: Kernel { sigma, follows_axes: false, ..small.kernel },
         frames: (0..request.frames.len()).collect(),
         region: small.region.map(|region| request.thinning.region(&region)),
         allowed: None,
@@ -262,25 +278,63 @@ fn voxels(thinning: &Thinning) -> usize {
     thinning.blocks().dims.iter().product()
 }
 
-/// Renders small pictures, and adds their values to `values`.
+/// The values of some pixels, and the lengths of their rays.
+#[derive(Default)]
+struct Pixels {
+    values: Vec<f32>,
+    /// As shares of the longest ray; none if values are not weighed by them.
+    shares: Vec<f32>,
+}
+
+impl Pixels {
+    /// Adds every `step`-th pixel of a picture.
+    fn add(&mut self, rendered: &Rendered<'_>, step: usize, rays: Option<&RayLengths>, size: [usize; 2]) {
+        let shares = rays.zip(rendered.views.get(rendered.view)).map(|(rays, view)| rays.shares(view, size));
+        let known = rendered.picture.iter().enumerate().step_by(step).filter(|(_, value)| !value.is_nan());
+        for (at, value) in known {
+            self.values.push(*value);
+            self.shares.extend(shares.as_ref().map(|shares| shares.get(at).copied().unwrap_or(1.0)));
+        }
+    }
+
+    /// The values as they are shown.
+    fn weighed(self, beyond: f64) -> Vec<f32> {
+        self.values.into_iter().zip(self.shares).map(|(value, share)| weighed(value, share, beyond as f32)).collect()
+    }
+}
+
+/// Renders small pictures, and adds their pixels.
 fn pictures(
     scene: &mut dyn Scene,
     config: &RenderConfig,
     progress: &dyn Progress,
-    values: &mut Vec<f32>,
+    pixels: &mut Pixels,
 ) -> Result<RenderReport> {
-    let pixels = config.frames.len() * config.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
-    let step = pixels.div_ceil(MOST_PIXELS).max(1);
+    let count = config.frames.len() * config.views.iter().map(|view| view.size[0] * view.size[1]).sum::<usize>();
+    let step = count.div_ceil(MOST_PIXELS).max(1);
+    let rays = is_of_means(config).then(|| rays(config, scene.grid()));
     render(scene, config, progress, &mut |rendered| {
-        values.extend(rendered.picture.iter().step_by(step).filter(|v| !v.is_nan()));
+        pixels.add(&rendered, step, rays.as_ref(), config.views[rendered.view].size);
         Ok(())
     })
 }
 
+/// Whether pictures are means along rays.
+pub(in crate::picture) fn is_of_means(config: &RenderConfig) -> bool {
+    matches!(config.mode, Mode::Projection) && config.quantity == Quantity::Mean
+}
+
+/// The rays through what is rendered of a grid.
+pub(in crate::picture) fn rays(config: &RenderConfig, grid: &Grid) -> RayLengths {
+    RayLengths::new(grid, &config.region.unwrap_or(grid.whole()), rim(&config.kernel, grid))
+}
+
 /// Which ranges are needed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::picture) struct Needed {
     pub(in crate::picture) pictures: bool,
+    /// The value beyond the volume, with which means are weighed.
+    pub(in crate::picture) beyond: BeyondSpec,
     pub(in crate::picture) errors: bool,
 }
 
@@ -290,7 +344,11 @@ pub(in crate::picture) struct Ranges {
     /// The smallest value above 0, if there is one.
     positive: Option<f64>,
     pub(in crate::picture) errors: (f64, f64),
-    /// The values of small pictures.
+    /// The value beyond the volume, if means are weighed with it.
+    pub(in crate::picture) beyond: Option<f64>,
+    /// Whether most values are tissue, whose range is wanted, and not that of a few bright spots.
+    pub(in crate::picture) is_of_tissue: bool,
+    /// The values of small pictures, as they are shown.
     all: Distribution,
     /// The overview that they show, if there is one.
     overview: Option<Overview>,
@@ -302,6 +360,8 @@ impl Default for Ranges {
             values: (0.0, 1.0),
             positive: Some(1.0),
             errors: (0.0, 1.0),
+            beyond: None,
+            is_of_tissue: false,
             all: Distribution::default(),
             overview: None,
         }
@@ -326,12 +386,12 @@ impl Ranges {
         let small = small(config);
         if needed.pictures {
             let rough = rough(&small);
-            match values_of_overview(scene, &rough, reporter)? {
-                Some((values, overview)) => {
-                    ranges.set_values(values);
+            match pixels_of_overview(scene, &rough, reporter)? {
+                Some((pixels, overview)) => {
+                    ranges.set_values(pixels, needed.beyond);
                     ranges.overview = Some(overview).filter(|_| scene.channels() == 1);
                 }
-                None => ranges.set_values(values_of_frames(scene, &rough, reporter)?),
+                None => ranges.set_values(pixels_of_frames(scene, &rough, reporter)?, needed.beyond),
             }
         }
         if needed.errors {
@@ -341,34 +401,55 @@ impl Ranges {
                 scene,
                 &certified,
                 progress("range of errors", &certified, reporter).as_ref(),
-                &mut Vec::new(),
+                &mut Pixels::default(),
             )?;
             ranges.errors.1 = report.certified_error.filter(|e| *e > 0.0).unwrap_or(1.0);
         }
         Ok(ranges)
     }
 
-    /// The ranges of pictures of a few of some frames. `render` gives them, row by row.
+    /// The ranges of pictures of a few of some frames. `render` gives them.
     pub(in crate::picture) fn from_pictures(
         frames: &[usize],
-        render: impl FnOnce(&[usize], &mut dyn FnMut(&[f32])) -> Result<()>,
+        beyond: BeyondSpec,
+        rays: &RayLengths,
+        size: [usize; 2],
+        render: impl FnOnce(&[usize], &mut dyn FnMut(&Rendered<'_>)) -> Result<()>,
     ) -> Result<Self> {
         let some: Vec<usize> = spread_over(frames.len(), MOST_FRAMES).into_iter().map(|n| frames[n]).collect();
-        let (mut ranges, mut values) = (Self::default(), Vec::new());
-        render(&some, &mut |picture| {
-            let step = (picture.len() * some.len()).div_ceil(MOST_PIXELS).max(1);
-            values.extend(picture.iter().step_by(step).filter(|v| !v.is_nan()));
+        let (mut ranges, mut pixels) = (Self::default(), Pixels::default());
+        render(&some, &mut |rendered| {
+            let step = (rendered.picture.len() * some.len()).div_ceil(MOST_PIXELS).max(1);
+            pixels.add(rendered, step, Some(rays), size);
         })?;
-        ranges.set_values(values);
+        ranges.set_values(pixels, beyond);
         Ok(ranges)
     }
 
-    fn set_values(&mut self, values: Vec<f32>) {
-        self.all = Distribution::new(values);
+    fn set_values(&mut self, pixels: Pixels, beyond: BeyondSpec) {
+        self.all = Distribution::new(pixels.values.clone());
+        self.beyond = self.beyond(beyond);
+        if let Some(beyond) = self.beyond {
+            self.all = Distribution::new(pixels.weighed(beyond));
+        }
         let values = self.all.values();
         if !values.is_empty() {
             self.values = robust_range(values);
             self.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));
+        }
+    }
+
+    /// The value beyond the volume: that of empty space, or the median.
+    fn beyond(&self, spec: BeyondSpec) -> Option<f64> {
+        let values = self.all.values();
+        match spec {
+            BeyondSpec::Nothing => None,
+            BeyondSpec::Value(value) => Some(value),
+            BeyondSpec::Auto if values.is_empty() => None,
+            BeyondSpec::Auto => {
+                let empty = Clear::empty_space(&self.all, robust_range(values)).map(|(_, empty)| empty.value);
+                Some(empty.unwrap_or_else(|| values[values.len() / 2].into()))
+            }
         }
     }
 
@@ -397,17 +478,31 @@ impl Ranges {
         (0.0, self.values.1)
     }
 
-    /// The default range of colours.
-    pub(in crate::picture) fn automatic(&self, norm: Norm, map: &TransferFunction) -> Result<(f64, f64)> {
+    /// The default range of colours. `least` is the least sample, if it is known.
+    pub(in crate::picture) fn automatic(
+        &self,
+        norm: Norm,
+        map: &TransferFunction,
+        least: Option<f64>,
+    ) -> Result<(f64, f64)> {
         const DECADES: f64 = 1e-4;
-        let (lo, hi) = self.values;
+        let (lo, mut hi) = self.values;
+        if self.is_of_tissue {
+            hi = tissue_end(self.all.values()).unwrap_or(hi);
+        }
         if norm == Norm::Log {
             let least =
                 self.positive.ok_or_else(|| Error::value("norm", "log", "no value is above 0; give `norm` linear"))?;
             return Ok((least.max(hi * DECADES), hi));
         }
-        Ok(if lo < hi { map.suitable(at_least_noticeable((lo, hi))) } else { (lo, hi) })
+        Ok(if lo < hi { map.suitable(at_least_noticeable(not_below_zero((lo, hi), least))) } else { (lo, hi) })
     }
+}
+
+/// The range without what errors put below 0 where no sample is negative. `least` is the least sample, if it is known.
+fn not_below_zero((lo, hi): (f64, f64), least: Option<f64>) -> (f64, f64) {
+    let is_below = lo < 0.0 && 0.0 < hi && least.is_some_and(|least| least >= 0.0);
+    (if is_below { 0.0 } else { lo }, hi)
 }
 
 /// The range around the same middle, at least as wide as a hundred thousandth of its values. What changes by less is mostly
@@ -421,6 +516,14 @@ fn at_least_noticeable((lo, hi): (f64, f64)) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ranges_of_samples_that_are_never_negative_begin_at_zero() {
+        assert_eq!(not_below_zero((-0.01, 0.4), Some(0.0)), (0.0, 0.4));
+        for (range, least) in [((-0.01, 0.4), Some(-0.01)), ((-0.01, 0.4), None), ((-2.0, -1.0), Some(0.0))] {
+            assert_eq!(not_below_zero(range, least), range);
+        }
+    }
 
     #[test]
     fn ranges_are_wider_than_rounding() {

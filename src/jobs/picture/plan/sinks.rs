@@ -3,13 +3,15 @@
 use super::colouring::Colouring;
 use super::format::is_page;
 use super::provenance::error_provenance;
+use super::ranges::rays;
 use super::speed::frames_per_second;
 use super::targets::{AllTargets, Targets};
 use crate::picture::request::PictureRequest;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
+use wavesplat_core::base::grid::Grid;
 use wavesplat_engine::render::annotate::Annotation;
-use wavesplat_engine::render::sink::{Provenance, Sink, SinkConfig};
+use wavesplat_engine::render::sink::{Provenance, Sink, SinkConfig, Weighing};
 use wavesplat_engine::render::{Pixel, RenderConfig, Rendered};
 
 /// The sinks of pictures and of their errors: one for each view, or one for all.
@@ -37,6 +39,8 @@ impl Sinks {
 /// The input of the sinks of a run.
 pub(in crate::picture) struct SinkInput<'a> {
     pub(in crate::picture) request: &'a PictureRequest,
+    /// The lattice that is rendered.
+    pub(in crate::picture) grid: &'a Grid,
     pub(in crate::picture) config: &'a RenderConfig,
     pub(in crate::picture) targets: &'a AllTargets,
     pub(in crate::picture) colouring: &'a Colouring,
@@ -57,10 +61,17 @@ impl SinkInput<'_> {
             pixel: self.colouring.pixel,
             colours: self.colouring.picture_scale.clone(),
             depth: request.depth,
+            weighing: self.weighing(),
             coloured_array: request.colormap.is_some(),
             annotation: (request.is_annotated() || is_page(request)).then(|| annotation.clone()),
             force: request.force,
         })
+    }
+
+    /// How means are weighed.
+    fn weighing(&self) -> Option<Weighing> {
+        let beyond = self.colouring.beyond? as f32;
+        Some(Weighing { rays: rays(self.config, self.grid), beyond })
     }
 
     /// Opens the sinks of a run.
@@ -77,7 +88,9 @@ impl SinkInput<'_> {
     fn error_config(&self, errors: &Targets, sink_config: &SinkConfig) -> SinkConfig {
         let Colouring { pixel, error_scale, .. } = self.colouring;
         let values = |annotation: Annotation| match pixel {
-            Pixel::Light => Annotation { values: "certified error of light".into(), ..annotation },
+            Pixel::Light => {
+                Annotation { values: "certified error of light".into(), surfaces: Vec::new(), ..annotation }
+            }
             Pixel::Value | Pixel::Channels => annotation,
         };
         SinkConfig {
@@ -86,6 +99,7 @@ impl SinkInput<'_> {
             pixel: if *pixel == Pixel::Light { Pixel::Value } else { *pixel },
             colours: error_scale.clone(),
             coloured_array: false,
+            weighing: None,
             annotation: sink_config.annotation.clone().map(values),
             ..sink_config.clone()
         }

@@ -133,9 +133,9 @@ fn refuse_video(inputs: &[PathBuf], output: &Path) -> Result<()> {
     if !VIDEOS.contains(&ending.as_str()) {
         return Ok(());
     }
-    let (name, pixels) = (output.display(), " -pix_fmt yuv420p");
+    let name = output.display();
     let inputs: Vec<_> = inputs.iter().map(|input| input.to_string_lossy()).collect();
-    let pipe = format!("wavesplat-render {} -o - `format` y4m | ffmpeg -i -{pixels} {name}", inputs.join(" "));
+    let pipe = format!("wavesplat-render {} -o - `format` y4m | ffmpeg -i - {name}", inputs.join(" "));
     Err(Error::path(output, format!("write .mp4, .webm or .gif, or type: {pipe}")))
 }
 

@@ -1,18 +1,28 @@
 //! Names and units as people write them.
 
-use wavesplat_core::base::description::{Attribute, Values};
+use wavesplat_core::base::description::{Attribute, Description, Values};
 use wavesplat_core::base::error::Result;
+use wavesplat_core::source::Archive;
 use wavesplat_engine::file::{CoefficientFile, setting};
 
 /// The name and the unit of a file's values.
 pub(in crate::picture) fn values_of(file: &CoefficientFile) -> Result<String> {
     let (m, description) = (file.metadata(), file.description()?);
-    let text = |name: &str| description.as_ref().and_then(|all| attribute_text(&all.attributes, name));
+    Ok(named(m.variable.as_deref(), setting(m, "units"), description.as_ref()))
+}
+
+/// The name and the unit of an archive's values.
+pub(in crate::picture) fn values_of_archive(archive: &Archive) -> String {
+    named(archive.variable.as_deref(), archive.units.samples.as_deref(), archive.description.as_ref())
+}
+
+/// The name and the unit of a variable, preferably those that its description has for readers.
+fn named(variable: Option<&str>, unit: Option<&str>, description: Option<&Description>) -> String {
+    let text = |name: &str| description.and_then(|all| attribute_text(&all.attributes, name));
     let name = text("long_name").or_else(|| text("standard_name").map(|name| name.replace('_', " ")));
-    let name = name.or_else(|| m.variable.clone()).unwrap_or_default();
-    let unit = setting(m, "units").map(ToString::to_string).or_else(|| text("units")).unwrap_or_default();
-    let unit = in_letters(&unit);
-    Ok(if unit.is_empty() || name.is_empty() { name + &unit } else { format!("{name} ({unit})") })
+    let name = name.or_else(|| variable.map(ToString::to_string)).unwrap_or_default();
+    let unit = in_letters(&unit.map(ToString::to_string).or_else(|| text("units")).unwrap_or_default());
+    if unit.is_empty() || name.is_empty() { name + &unit } else { format!("{name} ({unit})") }
 }
 
 /// The text of an attribute.

@@ -49,17 +49,19 @@ pub(in crate::picture) fn refuse_for_colours(request: &PictureRequest) -> Result
     }
 }
 
-/// The colours of values, over the range if one was given.
-pub(in crate::picture) fn value_colours(request: &PictureRequest) -> Result<TransferFunction> {
-    let map = open_colours("colormap", request.colormap.as_deref().unwrap_or("viridis"))?;
+/// The colours of values, over the range if one was given. Those of bodies are greys unless others are given.
+pub(in crate::picture) fn value_colours(request: &PictureRequest, is_of_body: bool) -> Result<TransferFunction> {
+    let usual = if is_of_body { "grey" } else { "viridis" };
+    let map = open_colours("colormap", request.colormap.as_deref().unwrap_or(usual))?;
     request.range.map_or(Ok(map.clone()), |range| map.over(range.0.into()))
 }
 
-/// The values of the first and the last colour, and the norm between them.
+/// The values of the first and the last colour, and the norm between them. `least` is the least sample, if it is known.
 pub(in crate::picture) fn value_spread(
     request: &PictureRequest,
     map: &TransferFunction,
     ranges: &Ranges,
+    least: Option<f64>,
     in_colours: bool,
     reporter: &dyn Reporter,
 ) -> Result<((f64, f64), Norm)> {
@@ -68,7 +70,7 @@ pub(in crate::picture) fn value_spread(
     }
     let norm = request.norm;
     if !map.is_of_values() {
-        return Ok((ranges.automatic(norm, map)?, norm));
+        return Ok((ranges.automatic(norm, map, least)?, norm));
     }
     let ((lo, hi), (least, most)) = (map.range(), ranges.values);
     if request.range.is_none() && (most < lo || hi < least) {

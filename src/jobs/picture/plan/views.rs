@@ -5,7 +5,7 @@ use super::axes::Axes;
 use super::camera_path::{Stand, is_moving, stands};
 use super::modes::mode_name;
 use crate::picture::request::PictureRequest;
-use crate::picture::values::ModeName;
+use crate::picture::values::{Convention, ModeName};
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Grid;
 use wavesplat_core::view::camera::{Camera, View};
@@ -79,25 +79,53 @@ pub(in crate::picture) fn fixed(views: &[View], grid: &Grid) -> Result<Vec<View>
 
 /// The view of the only slice, if it is to be seen face-on.
 pub(in crate::picture) fn face_on(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<Option<View>> {
-    let has_no_view = request.view.is_empty() && request.orbit == 1 && !is_moving(request);
     match request.slice.as_slice() {
-        [only] if has_no_view && mode_name(request) == ModeName::Slice => {
-            view_across(request, axes.find("slice", &only.axis)?, grid).map(Some)
-        }
+        [only] if !has_own_view(request) => filling(request, axes, axes.find("slice", &only.axis)?, grid).map(Some),
         _ => Ok(None),
     }
 }
 
-/// A plane across an axis, face-on: x to the right if possible, else y; z up if possible, else y. It fills the picture,
-/// beside the annotation.
-fn view_across(request: &PictureRequest, axis: usize, grid: &Grid) -> Result<View> {
-    let [azimuth, elevation] = [[270.0, 0.0], [180.0, 0.0], [180.0, 90.0]][axis];
-    let (size, view) = (request.size.0, view_from(request, azimuth, elevation));
+/// Whether the view of slices is given, or they are drawn within something.
+pub(in crate::picture) fn has_own_view(request: &PictureRequest) -> bool {
+    let is_usual = request.view.is_empty() && request.orbit == 1 && !is_moving(request);
+    !is_usual || mode_name(request) != ModeName::Slice
+}
+
+/// The axes to the right and up in a slice across an axis: x to the right if possible, else y; z up if possible, else y.
+pub(in crate::picture) fn across_and_up(cut: usize) -> [usize; 2] {
+    [[1, 2], [0, 2], [0, 1]][cut]
+}
+
+/// The view that sees a slice across an axis face-on. A patient's anterior and superior sides are at the right or top, and the side that the
+/// convention asks for is at the left.
+pub(in crate::picture) fn view_across(request: &PictureRequest, axes: &Axes, cut: usize) -> View {
+    let right = match request.convention {
+        Convention::Neurological => 'R',
+        Convention::Radiological => 'L',
+    };
+    let is_turned = |axis: usize| axes.sides(axis).is_some_and(|[first, _]| [right, 'A', 'S'].contains(&first));
+    let [turns_across, turns_up] = across_and_up(cut).map(is_turned);
+    let [azimuth, elevation] = [[270.0, 0.0], [180.0, 0.0], [180.0, 90.0]][cut];
+    // Seen from behind, a slice is turned upside down or left to right.
+    let is_behind = turns_across != turns_up;
+    let (azimuth, elevation, is_upside_down) = match (cut, is_behind) {
+        (2, true) => (azimuth, -elevation, turns_across),
+        (_, true) => ((azimuth + 180.0) % 360.0, elevation, turns_up),
+        (_, false) => (azimuth, elevation, turns_up),
+    };
+    let roll = if is_upside_down { 180.0 } else { 0.0 };
+    let view = view_from(request, azimuth, elevation);
+    View { roll: view.roll + roll, ..view }
+}
+
+/// A slice across an axis, face-on. It fills the picture, beside the annotation.
+fn filling(request: &PictureRequest, axes: &Axes, cut: usize, grid: &Grid) -> Result<View> {
+    let (size, view) = (request.size.0, view_across(request, axes, cut));
     if request.scale.is_some() || request.center.is_some() || request.roll != 0.0 {
         return Ok(view);
     }
     let around @ Margins { left, right, top, bottom } = picture_margins(request);
-    let [across, up] = [[1, 2], [0, 2], [0, 1]][axis];
+    let [across, up] = across_and_up(cut);
     let fit = |pixels: usize, along: usize| pixels as f64 / (grid.dims[along] as f64 * grid.spacing[along]);
     let scale = fit(size[0] - left - right, across).min(fit(size[1] - top - bottom, up));
     let views = beside(vec![View { scale: Some(scale), ..view }], &[1.0], grid, around)?;

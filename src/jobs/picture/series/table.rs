@@ -4,6 +4,7 @@ use super::Series;
 use super::chart::{Band, Chart, Line};
 use crate::picture::plan::units::attribute_text;
 use std::fmt::Write as _;
+use wavesplat_core::base::decimal;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::time_labels::TimeLabels;
 use wavesplat_engine::file::{CoefficientFile, setting, time_labels};
@@ -51,7 +52,7 @@ impl Table {
         let mut csv = row(&heads);
         for (n, frame) in self.frames.iter().enumerate() {
             let mut cells = vec![frame.to_string()];
-            cells.extend(times.get(*frame).map(f64::to_string));
+            cells.extend(times.get(*frame).map(|time| decimal::short(*time)));
             cells.extend(has_dates.then(|| self.named.times.date(*frame).unwrap_or_default()));
             cells.extend(self.series.iter().map(|series| series.values[n].to_string()));
             csv += &row(&cells);

@@ -98,4 +98,38 @@ impl fmt::Display for ClearSpec {
     }
 }
 
-serde_as_text!(Exaggeration, Detail, ClearSpec);
+/// The value that short rays meet beyond the volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BeyondSpec {
+    /// That of empty space, or the median.
+    Auto,
+    /// None: means stay as they are.
+    Nothing,
+    /// This one.
+    Value(f64),
+}
+
+impl FromStr for BeyondSpec {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let value = || text.parse().ok().filter(|value: &f64| value.is_finite());
+        match text {
+            "auto" => Ok(Self::Auto),
+            "none" => Ok(Self::Nothing),
+            _ => value().map(Self::Value).ok_or_else(|| "auto, none, or a value".into()),
+        }
+    }
+}
+
+impl fmt::Display for BeyondSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Nothing => f.write_str("none"),
+            Self::Value(value) => value.fmt(f),
+        }
+    }
+}
+
+serde_as_text!(Exaggeration, Detail, ClearSpec, BeyondSpec);

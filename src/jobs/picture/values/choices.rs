@@ -58,6 +58,23 @@ impl ModeName {
     }
 }
 
+/// Which side of a patient slices show at the right.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Convention {
+    /// The right one: the viewer looks from behind or from above.
+    #[default]
+    Neurological,
+    /// The left one: the viewer faces the patient.
+    Radiological,
+}
+
+impl Choice for Convention {
+    const CHOICES: &'static [(&'static str, Self, &'static str)] = &[
+        ("neurological", Self::Neurological, "The patient's right side is at the right"),
+        ("radiological", Self::Radiological, "The patient's left side is at the right"),
+    ];
+}
+
 /// Colours of background and letters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Theme {

@@ -7,8 +7,8 @@ mod position;
 mod surfaces;
 mod view_angles;
 
-pub use automatic::{ClearSpec, Detail, Exaggeration};
-pub use choices::{ModeName, Theme};
+pub use automatic::{BeyondSpec, ClearSpec, Detail, Exaggeration};
+pub use choices::{Convention, ModeName, Theme};
 pub use hex_colour::HexColour;
 pub use position::{AxisPosition, PointSpec, SliceSpec};
 pub use surfaces::SurfaceList;

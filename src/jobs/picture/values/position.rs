@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 use wavesplat_core::base::choice::serde_as_text;
+use wavesplat_core::base::values::share;
 
 /// A position along an axis, as options name it.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,8 +25,8 @@ impl FromStr for AxisPosition {
         if let Some(voxel) = text.strip_prefix('#') {
             return number(voxel).map(Self::Voxel);
         }
-        if let Some(percent) = text.strip_suffix('%') {
-            return number(percent).map(|percent| Self::Share(percent / 100.0));
+        if text.ends_with('%') {
+            return share(text).map(Self::Share).map_err(|_| wrong(text));
         }
         let is_share = |at: &f64| !text.starts_with('@') && text.contains('.') && (0.0..=1.0).contains(at);
         if let Some(share) = number(text).ok().filter(is_share) {

@@ -4,7 +4,8 @@ use super::hex_colour::HexColour;
 use std::fmt;
 use std::str::FromStr;
 use wavesplat_core::base::choice::serde_as_text;
-use wavesplat_core::colour::{Colour, TransferFunction};
+use wavesplat_core::base::values::share;
+use wavesplat_core::colour::{At, Colour, TransferFunction};
 use wavesplat_engine::render::Surface;
 
 /// Surfaces as V, V:RRGGBB or V:RRGGBB:OPACITY, with commas between.
@@ -17,15 +18,6 @@ struct Named {
     at: At,
     colour: Option<HexColour>,
     opacity: Option<f64>,
-}
-
-/// The value of a surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum At {
-    /// In the samples' unit.
-    Value(f64),
-    /// A share of the range of colours.
-    Share(f64),
 }
 
 /// The colour of a single surface: bright on black and on white.
@@ -47,7 +39,7 @@ impl FromStr for SurfaceList {
 
 fn named(text: &str) -> Result<Named, String> {
     let mut parts = text.trim().split(':');
-    let at = at(parts.next().unwrap_or_default())?;
+    let at = At::parse(parts.next().unwrap_or_default(), At::Value)?;
     let mut part = || parts.next().filter(|part| !part.is_empty());
     let colour = part().map(str::parse).transpose()?;
     let opacity = part().map(opacity).transpose()?;
@@ -57,31 +49,18 @@ fn named(text: &str) -> Result<Named, String> {
     }
 }
 
-fn at(text: &str) -> Result<At, String> {
-    let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
-    match text.strip_suffix('%') {
-        Some(percent) => number(percent).filter(|p| (0.0..=100.0).contains(p)).map(|p| At::Share(p / 100.0)),
-        None => number(text).map(At::Value),
-    }
-    .ok_or_else(|| format!("'{text}' is neither a value nor a share of the range such as 40%"))
-}
-
 fn opacity(text: &str) -> Result<f64, String> {
-    let opacity = text.parse().ok().filter(|opacity| *opacity > 0.0 && *opacity <= 1.0);
+    let opacity = share(text).ok().filter(|opacity| *opacity > 0.0 && *opacity <= 1.0);
     opacity.ok_or_else(|| format!("'{text}' is no opacity; it is above 0 and at most 1"))
 }
 
 impl SurfaceList {
     /// The surfaces, with the colours that a map has at their values unless they have their own.
     pub(crate) fn surfaces(&self, map: &TransferFunction, is_map_given: bool) -> Vec<Surface> {
-        let (lo, hi) = map.range();
         let is_single = self.0.len() == 1;
         let map_colour = |value| map.colour(value).filter(|_| is_map_given || !is_single).unwrap_or(COLOUR);
         let surface = |named: &Named| {
-            let value = match named.at {
-                At::Value(value) => value,
-                At::Share(share) => lo + share * (hi - lo),
-            };
+            let value = named.at.value(map.range());
             let opacity = named.opacity.unwrap_or(if is_single { 1.0 } else { 0.6 });
             Surface { value, colour: named.colour.map_or_else(|| map_colour(value), HexColour::shares), opacity }
         };
@@ -124,10 +103,10 @@ mod tests {
 
     #[test]
     fn surfaces_have_values_colours_and_opacities() {
-        assert_eq!(surfaces("3", false), Ok(vec![(3.0, COLOUR, 1.0)]));
+        assert_eq!(surfaces("@3", false), Ok(vec![(3.0, COLOUR, 1.0)]));
         assert_eq!(surfaces("25%", true), Ok(vec![(3.0, [0.25; 3], 1.0)]));
         assert_eq!(
-            surfaces("-1e3:ff0000,50%::0.3", false),
+            surfaces("-1e3:ff0000,50%::30%", false),
             Ok(vec![(-1e3, [1.0, 0.0, 0.0], 0.6), (4.0, [0.5; 3], 0.3)])
         );
     }

@@ -93,3 +93,10 @@ function paintChannels(planes, scale, background, pixels) {
     }
   }
 }
+
+// Values as if all rays were equally long (eq 51). The shares of the longest ray are RGBA bytes with a high and a low byte.
+function weighed(values, shares, beyond) {
+  if (!shares) return values;
+  const share = i => (256 * shares[4 * i] + shares[4 * i + 1]) / 65535;
+  return values.map((value, i) => beyond + share(i) * (value - beyond));
+}

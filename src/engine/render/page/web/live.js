@@ -25,6 +25,7 @@ class Live {
       log: false, clear: null, maps: facts.maps, map: 'viridis', fps: 25, labels: facts.labels, settings: {}, mode: '',
     };
     this.about = this.first;
+    this.opening = facts.opening;
     this.sequences = [{ label: '', pictures: facts.labels.map((_, frame) => ({ view: 0, frame })) }];
     this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: 'box,axes', ...this.home() };
     this.known = {}; // automatic range and clear values of each mode, from its first answer
@@ -64,11 +65,12 @@ class Live {
   }
 
   // The fields of a PictureRequest for colours.
-  coloursOf(mode, { map, range, log, clear }) {
+  coloursOf(mode, { map, range, log, clear, beyond }) {
     const ofSamples = mode === 'composite' || mode === 'iso', isClear = clear && !ofSamples && mode !== 'slice';
     return {
       [ofSamples ? 'transfer_function' : 'colormap']: map, range: range ? texts(range) : undefined, norm: log && !ofSamples ? 'log' : undefined,
       clear: isClear ? clear.length === 2 ? texts(clear) : 'none' : undefined,
+      beyond: beyond === undefined || ofSamples || mode === 'slice' || mode === 'mip' ? undefined : beyond === null ? 'none' : short(beyond),
     };
   }
 
@@ -163,12 +165,13 @@ class Live {
     Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, hasBar: mode === 'composite', opacity });
     about.mode = mode === 'error' && !errors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
-    if (!isChosen) this.known[colours] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null };
-    const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;
+    if (!isChosen) this.known[colours] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null, beyond: about.shares[0] ? about.beyond : null };
+    const kept = this.remembered(key), still = address => address ? pixelsOf(address, about.size) : null;
+    const [backdrop, shares] = await Promise.all([about.backdrops[0], about.shares[0]].map(still));
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
       const { pictures } = await readBlock(bytes.subarray(at, at += size));
-      pictures.forEach((planes, n) => kept.set(frames[0] + first + n, { planes, about, backdrop }));
+      pictures.forEach((planes, n) => kept.set(frames[0] + first + n, { planes, about, backdrop, shares }));
     }
     if (errors) this.showErrors(kept, frames[0], (await readBlock(bytes.subarray(at, at + errors))).pictures);
     return kept;
@@ -180,7 +183,7 @@ class Live {
     pictures.forEach((planes, n) => {
       const { planes: [beneath], about, ...rest } = kept.get(first + n);
       const values = `largest error of ${about.values || 'values'}`;
-      kept.set(first + n, { ...rest, planes, beneath, about: { ...about, values, range: [0, this.largestError], clear: null, log: false } });
+      kept.set(first + n, { ...rest, planes, beneath, shares: null, about: { ...about, values, range: [0, this.largestError], clear: null, log: false } });
     });
   }
 

@@ -30,7 +30,7 @@ class Player {
     this.source = source;
     this.chosen = { map: null }; // the map that was chosen, and the range, the logarithm and gamma of each kind of picture
     this.sequence = 0;
-    this.index = 0;
+    this.index = source.opening;
     this.shown = null;
     this.isPlaying = false;
     this.context = element('picture').getContext('2d');
@@ -225,9 +225,10 @@ class Player {
   }
 
   draw() {
-    const { planes, backdrop, about } = this.shown ?? {};
+    const { planes, backdrop, shares, about } = this.shown ?? {};
     if (!planes || planes[0].length * 4 !== this.image.data.length) return;
-    paint(planes, about.kind, this.scale, backdrop ?? this.plainBackground(planes[0].length), this.image.data);
+    const painted = about.kind === 'value' ? [weighed(planes[0], shares, about.beyond)] : planes;
+    paint(painted, about.kind, this.scale, backdrop ?? this.plainBackground(planes[0].length), this.image.data);
     this.context.putImageData(this.image, 0, 0);
     document.documentElement.dataset.drawn = `${this.sequence}:${this.index}`;
   }

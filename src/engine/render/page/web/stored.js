@@ -8,6 +8,7 @@ const bytesOf = base64 => Uint8Array.from(atob(base64), letter => letter.charCod
 class Stored {
   constructor(about) {
     this.about = about;
+    this.opening = about.opening;
     const { maps, sequences, settings } = this.about;
     this.about.hasBar = settings?.mode === 'composite';
     for (const name in maps) maps[name] = bytesOf(maps[name]);
@@ -17,7 +18,7 @@ class Stored {
       script, sequence: Number(script.dataset.sequence), first: Number(script.dataset.first), count: Number(script.dataset.count),
     }));
     this.unpacked = new Map(); // the block that was used last is at the end
-    this.backdrops = new Map();
+    this.stills = new Map();
   }
 
   async picture(sequence, index) {
@@ -25,8 +26,9 @@ class Stored {
     const block = this.blocks.find(holds);
     if (!block) throw new Error(`this page lacks picture ${index}`);
     const { view } = this.sequences[sequence].pictures[index];
-    const [{ pictures }, backdrop] = await Promise.all([this.unpack(block), this.backdrop(view)]);
-    return { planes: pictures[index - block.first], about: this.about, backdrop };
+    const stills = [this.about.backdrops, this.about.shares].map(all => this.still(all[view]));
+    const [{ pictures }, backdrop, shares] = await Promise.all([this.unpack(block), ...stills]);
+    return { planes: pictures[index - block.first], about: this.about, backdrop, shares };
   }
 
   whole(sequence, index) { return this.picture(sequence, index); }
@@ -43,12 +45,11 @@ class Stored {
     return found;
   }
 
-  // The backdrop of a view, which lies behind its pictures.
-  backdrop(view) {
-    const address = this.about.backdrops[view];
+  // The bytes of what is the same for all pictures of a view: its backdrop, which lies behind them, or the lengths of its rays.
+  still(address) {
     if (!address) return null;
-    if (!this.backdrops.has(view)) this.backdrops.set(view, pixelsOf(address, this.about.size));
-    return this.backdrops.get(view);
+    if (!this.stills.has(address)) this.stills.set(address, pixelsOf(address, this.about.size));
+    return this.stills.get(address);
   }
 }
 
