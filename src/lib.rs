@@ -169,13 +169,13 @@ pub use wavesplat_format as format;
 #[doc(inline)]
 pub use wavesplat_formats as formats;
 #[doc(inline)]
-pub use wavesplat_jobs::{extract, picture};
+pub use wavesplat_jobs::{axes, extract, picture};
 
 /// Errors, grids, samples, mapped files and what else all parts use.
 pub mod base {
     #[doc(inline)]
     pub use wavesplat_core::base::{
-        address, cancel, choice, description, error, grid, inputs, mapped, progress, sample, values, workers,
+        address, cancel, choice, description, error, grid, inputs, mapped, position, progress, sample, values, workers,
     };
 }
 

@@ -13,6 +13,7 @@ use wavesplat_core::source::{self, FrameSource, OpenOptions, RegularTimes, Selec
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::setting;
 use wavesplat_formats as formats;
+use wavesplat_jobs::axes::Axes;
 use wavesplat_jobs::picture::is_coefficient_name;
 
 /// The order of a sample's bytes.
@@ -221,7 +222,7 @@ impl InputArgs {
         };
         let source = formats::open(inputs, &options)?;
         source.archive().notes.iter().for_each(|n| common.note(note_text(n)));
-        narrow(source, frames, remembered(file, "region")?)
+        narrow(source, frames, remembered(file, "region")?.as_ref())
     }
 
     /// Gives frames that are appended to a file the times that follow in its steps, if it was converted with regular
@@ -293,15 +294,15 @@ pub struct SelectArgs {
     /// Only these frames: a:b or a:b:step, without b
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Input")]
     pub frames: Option<FrameRange>,
-    /// Only these voxels: x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX", help_heading = "Input")]
+    /// Only these voxels: x0:x1,y0:y1,z0:z1, as numbers, shares like 10%:50%, or coordinates like @30:@45m
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "Input")]
     pub region: Option<RegionSpec>,
 }
 
 impl SelectArgs {
     /// Narrows an archive to the chosen frames and voxels.
     pub fn narrow(&self, source: Box<dyn FrameSource>) -> Result<Box<dyn FrameSource>> {
-        narrow(source, self.frames, self.region)
+        narrow(source, self.frames, self.region.as_ref())
     }
 }
 
@@ -309,7 +310,7 @@ impl SelectArgs {
 pub fn narrow(
     source: Box<dyn FrameSource>,
     frames: Option<FrameRange>,
-    region: Option<RegionSpec>,
+    region: Option<&RegionSpec>,
 ) -> Result<Box<dyn FrameSource>> {
     if frames.is_none() && region.is_none() {
         return Ok(source);
@@ -317,6 +318,7 @@ pub fn narrow(
     let archive = source.archive();
     let all = || ":".parse::<FrameRange>().expect("a range of all frames");
     let (first, step, count) = frames.unwrap_or_else(all).resolve(archive.frames)?;
-    let region = region.map_or(Ok(archive.grid.whole()), |r| r.resolve(&archive.grid))?;
+    let axes = || Axes::new(&archive.grid, archive.units.space.as_deref(), archive.description.as_ref());
+    let region = region.map_or(Ok(archive.grid.whole()), |region| axes().region("region", region))?;
     source::select(source, Selection { first, step, frames: count, region })
 }

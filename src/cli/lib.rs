@@ -36,7 +36,8 @@ pub use terminal::{ProgressKind, TerminalProgress};
 pub use times::TimesSpec;
 pub use values::{Dims, Size};
 use wavesplat_core::base::inputs::spare_inputs;
-use wavesplat_core::base::values::{FrameList, FrameRange, Numbers, Pair, RegionSpec, Triple};
+use wavesplat_core::base::position::RegionSpec;
+use wavesplat_core::base::values::{FrameList, FrameRange, Numbers, Pair, Triple};
 
 use std::io::{self, Write};
 use wavesplat_core::base::error::{Error, Result};

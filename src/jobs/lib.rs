@@ -2,5 +2,7 @@
 //! extraction. The package `wavesplat` explains it, and is what programs depend on.
 
 pub mod report;
+mod units;
+pub mod axes;
 pub mod extract;
 pub mod picture;

@@ -252,3 +252,27 @@ fn coefficient_files_are_repacked() {
     work.wavesplat("convert damaged.wspl -o b.wspl").fails(3, &["damaged.wspl", "directory"]);
     assert!(!work.names().contains(&"b.wspl".to_string()));
 }
+
+#[test]
+fn boxes_are_given_in_voxels_shares_and_coordinates() {
+    let work = Work::with_file("--spacing 0.5,1,2 --origin 10,0,-4");
+    let region = |of: &str| {
+        work.wavesplat(&format!("extract a.wspl --frames 3 --region={of} -o r.npy --force")).ok();
+        work.read("r.npy")
+    };
+    let plain = region("2:7,4:7,2:5");
+    for same in ["@11:@13,25%:50%,#2:#5", "@10.9:@13.2,4:7,@0:@4", "2:7,4:7,@-0.5:50%"] {
+        assert!(region(same) == plain, "{same}");
+    }
+    work.wavesplat("convert a.npy -o b.wspl --spacing 0.5,1,2 --origin 10,0,-4 --region @11:@13,:,:").ok();
+    assert_eq!(work.wavesplat("info b.wspl --json").ok().json()["dims"][0], 5);
+    for (wrong, words) in [
+        ("@30:@40,:,:", ["--region", "empty, or not within"]),
+        ("#1.5:,:,:", ["--region", "whole voxels"]),
+        ("@1km:,:,:", ["--region", "'km' is another unit"]),
+        ("0:99,:,:", ["--region", "20x14x10"]),
+    ] {
+        work.wavesplat(&format!("extract a.wspl --region={wrong} -o x.npy")).fails(2, &words);
+        work.render(&format!("a.wspl --region={wrong} -o x.npy")).fails(2, &words);
+    }
+}

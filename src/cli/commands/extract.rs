@@ -10,6 +10,7 @@ use wavesplat_core::base::mapped::Access;
 use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::CHANNELS;
 use wavesplat_engine::file::CoefficientFile;
+use wavesplat_jobs::axes::Axes;
 use wavesplat_jobs::extract::{
     ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to_sink,
 };
@@ -50,8 +51,8 @@ pub(crate) struct ExtractArgs {
     /// Extract only these frames: ranges a:b:step or numbers, separated by commas
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
     frames: Option<FrameList>,
-    /// Extract only these voxels: x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX")]
+    /// Extract only these voxels: x0:x1,y0:y1,z0:z1, as numbers, shares like 10%:50%, or coordinates like @30:@45m
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true)]
     region: Option<RegionSpec>,
     /// Extract every 2^N-th voxel along each axis, from fewer bytes. --region counts all voxels
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -118,7 +119,7 @@ impl ExtractArgs {
     /// The chosen voxels.
     fn region(&self, file: &CoefficientFile) -> Result<Region> {
         let Some(region) = &self.region else { return Ok(file.grid.whole()) };
-        let region = region.resolve(&file.whole_grid())?.every(1 << self.lod);
+        let region = Axes::from_file(file)?.region("region", region)?.every(1 << self.lod);
         if region.is_empty() {
             return Err(Error::usage(format!("--region: holds no voxel with --lod {}", self.lod)));
         }

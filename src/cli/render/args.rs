@@ -8,7 +8,8 @@ use std::path::PathBuf;
 use wavesplat_core::base::address::is_address;
 use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::error::Result;
-use wavesplat_core::base::values::{FrameList, RegionSpec, Triple, Whole, share};
+use wavesplat_core::base::position::RegionSpec;
+use wavesplat_core::base::values::{FrameList, Triple, Whole, share};
 use wavesplat_engine::render::sink::{Depth, PictureFormat};
 use wavesplat_engine::render::{Limit, Quantity, SplatSource};
 use wavesplat_jobs::picture::values::{Detail, Exaggeration, ViewAngles};
@@ -83,8 +84,8 @@ pub struct Cli {
     /// Render only these frames: ranges a:b:step or numbers, separated by commas
     #[arg(long, value_name = "FRAMES", allow_hyphen_values = true, help_heading = "View")]
     pub(super) frames: Option<FrameList>,
-    /// Render only these voxels: x0:x1,y0:y1,z0:z1
-    #[arg(long, value_name = "BOX", help_heading = "View")]
+    /// Render only these voxels: x0:x1,y0:y1,z0:z1, as numbers, shares like 10%:50%, or coordinates like @30:@45m
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "View")]
     pub(super) region: Option<RegionSpec>,
     /// Attenuation per world unit of depth. Pixels whose weights sum to less than 1 % of the view's largest are
     /// background
@@ -180,7 +181,7 @@ impl Cli {
             center: self.center,
             exaggerate: self.exaggerate,
             frames: self.frames.clone(),
-            region: self.region,
+            region: self.region.clone(),
             tau: self.tau,
             sigma: self.sigma,
             splat_error: self.splat_error,

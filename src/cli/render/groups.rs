@@ -4,7 +4,8 @@
 use crate::choice::choice;
 use clap::Args;
 use std::path::PathBuf;
-use wavesplat_core::base::values::{Pair, RegionSpec};
+use wavesplat_core::base::position::RegionSpec;
+use wavesplat_core::base::values::Pair;
 use wavesplat_core::colour::{Norm, Opacities};
 use wavesplat_engine::render::annotate::Parts;
 use wavesplat_jobs::picture::values::{
@@ -143,7 +144,7 @@ pub(super) struct SeriesArgs {
     pub(super) probe: Vec<PointSpec>,
     /// Write the mean, the least and the largest value of voxels x0:x1,y0:y1,z0:z1 over time instead of pictures; repeat
     /// it for more regions
-    #[arg(long, value_name = "BOX", help_heading = "Time series")]
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "Time series")]
     pub(super) probe_region: Vec<RegionSpec>,
 }
 

@@ -28,6 +28,7 @@ pub mod sample;
 pub mod stored;
 pub mod grid;
 pub mod values;
+pub mod position;
 pub mod description;
 pub mod mapped;
 #[doc(hidden)]

@@ -1,8 +1,7 @@
-//! Values of settings as texts: numbers, frames, boxes of voxels.
+//! Values of settings as texts: numbers and frames.
 
 use super::choice::serde_as_text;
 use super::error::{Error, Result};
-use super::grid::{Grid, Region};
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
@@ -190,47 +189,7 @@ impl FrameList {
     }
 }
 
-/// A box of voxels: `x0:x1,y0:y1,z0:z1`. The default of each end is that of the volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RegionSpec([(Option<usize>, Option<usize>); 3]);
-
-impl FromStr for RegionSpec {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let wrong = || "takes x0:x1,y0:y1,z0:z1, without x1, y1 and z1, like 0:32,:,10:20".to_string();
-        let end = |t: &str| if t.is_empty() { Ok(None) } else { t.parse().map(Some).map_err(|_| wrong()) };
-        let axes: Vec<(Option<usize>, Option<usize>)> = text
-            .split(',')
-            .map(|axis| axis.split_once(':').ok_or_else(wrong).and_then(|(a, b)| Ok((end(a)?, end(b)?))))
-            .collect::<std::result::Result<_, String>>()?;
-        axes.try_into().map(Self).map_err(|_| wrong())
-    }
-}
-
-impl fmt::Display for RegionSpec {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let end = |e: Option<usize>| e.map_or(String::new(), |n| n.to_string());
-        write!(f, "{}", self.0.map(|(a, b)| format!("{}:{}", end(a), end(b))).join(","))
-    }
-}
-
-impl RegionSpec {
-    /// The region of a grid.
-    pub fn resolve(&self, grid: &Grid) -> Result<Region> {
-        let region = Region {
-            start: std::array::from_fn(|a| self.0[a].0.unwrap_or(0)),
-            end: std::array::from_fn(|a| self.0[a].1.unwrap_or(grid.dims[a])),
-        };
-        if !grid.whole().contains(&region) || region.is_empty() {
-            let [x, y, z] = grid.dims;
-            return Err(Error::setting("region", format!("empty, or not within the volume of {x}x{y}x{z} voxels")));
-        }
-        Ok(region)
-    }
-}
-
-serde_as_text!(Whole<2>, Numbers<2>, Numbers<3>, FrameRange, FrameList, RegionSpec);
+serde_as_text!(Whole<2>, Numbers<2>, Numbers<3>, FrameRange, FrameList);
 
 #[cfg(test)]
 mod tests {
@@ -264,16 +223,5 @@ mod tests {
     fn a_streams_frames_may_be_open_ended_but_not_counted_back() {
         assert_eq!("2::3".parse::<FrameRange>().expect("a range").resolve(None).expect("open"), (2, 3, None));
         assert!("-2:".parse::<FrameRange>().expect("a range").resolve(None).is_err());
-    }
-
-    #[test]
-    fn regions_may_leave_ends_out() {
-        let grid = Grid::unit([10, 20, 30]);
-        let region = "2:4,:,5:".parse::<RegionSpec>().expect("a region").resolve(&grid).expect("inside");
-        assert_eq!(region, Region { start: [2, 0, 5], end: [4, 20, 30] });
-        for wrong in ["0:11,:,:", "4:4,:,:"] {
-            assert!(wrong.parse::<RegionSpec>().expect("a region").resolve(&grid).is_err(), "{wrong}");
-        }
-        assert!("1:2,3:4".parse::<RegionSpec>().is_err());
     }
 }

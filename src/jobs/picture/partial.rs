@@ -154,7 +154,7 @@ fn refuse_for_partial(request: &PictureRequest) -> Result<()> {
 /// Plans a partial sum: the settings that all parts share, and its own views, frames and voxels.
 fn plan_partial(request: &PictureRequest, opened: &Opened, file: &CoefficientFile, memory: usize) -> Result<Planned> {
     let (standing, scene) = (ShardPlace::from_file(file)?, opened.scene.as_ref());
-    let mut config = render_config(request, scene, Some(file), None, standing.all, memory)?;
+    let mut config = render_config(request, scene, Some(file), &opened.axes, None, standing.all, memory)?;
     let setup = shared_setup(request, opened, file, &config, &standing);
     let frames = [standing.frames.start, standing.frames.end];
     let source = PartialSource { file: file.id().to_string(), frames, times: file.metadata().times.clone() };

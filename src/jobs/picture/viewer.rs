@@ -10,7 +10,7 @@ use super::reporter::Caller;
 use super::request::{PictureRequest, option};
 use super::series::series_csv;
 use super::session::Session;
-use super::values::{AxisPosition, PointSpec, ViewAngles};
+use super::values::{PointSpec, ViewAngles};
 use super::view_request::ViewRequest;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -19,6 +19,7 @@ use wavesplat_core::base::address::public_name;
 use wavesplat_core::base::cancel::CancelToken;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::Output;
+use wavesplat_core::base::position::AxisPosition;
 use wavesplat_core::base::progress::Silent;
 use wavesplat_core::base::temporary::TemporaryFolder;
 use wavesplat_core::colour::Distribution;
@@ -189,10 +190,11 @@ impl ViewerSession {
     pub fn histogram(&self, frame: Option<usize>, work: &CancelToken) -> Result<Histogram> {
         let frames = frame.map_or(self.base.frames.clone(), |frame| Some((frame..frame + 1).into()));
         let (request, caller) = (PictureRequest { frames, ..self.base.clone() }, Caller(work));
-        let Opened { mut scene, file, distributions, colours, .. } = Opened::new(&self.session, &request, &caller)?;
+        let Opened { mut scene, file, distributions, colours, axes, .. } =
+            Opened::new(&self.session, &request, &caller)?;
         let all = scene.frames().unwrap_or(0);
         let memory = self.session.memory;
-        let config = render_config(&request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, memory)?;
+        let config = render_config(&request, scene.as_ref(), file.as_deref(), &axes, colours.as_ref(), all, memory)?;
         let samples = match frame {
             Some(frame) => distribution_of_frames(scene.as_mut(), &distributions, &config, vec![frame], &caller)?,
             None => distribution(scene.as_mut(), &distributions, &config, None, &caller)?,

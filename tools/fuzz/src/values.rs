@@ -3,8 +3,10 @@
 use super::input::Input;
 use std::fmt::{Debug, Display};
 use std::str::FromStr;
+use wavesplat::axes::Axes;
 use wavesplat::base::grid::Grid;
-use wavesplat::base::values::{FrameList, FrameRange, Pair, RegionSpec, Triple, Whole};
+use wavesplat::base::position::RegionSpec;
+use wavesplat::base::values::{FrameList, FrameRange, Pair, Triple, Whole};
 use wavesplat_cli::{Dims, Size};
 
 /// Parses text as every kind of value, for an archive of at most 999 frames and 256 voxels along an axis.
@@ -26,7 +28,7 @@ pub fn values(data: &[u8]) {
     }
     if let Some(spec) = reads_back::<RegionSpec>(text) {
         let grid = Grid::unit(dims);
-        if let Ok(region) = spec.resolve(&grid) {
+        if let Ok(region) = Axes::new(&grid, Some("m"), None).region("region", &spec) {
             assert!(!region.is_empty() && grid.whole().contains(&region), "{spec}");
         }
     }

@@ -261,7 +261,7 @@ impl ConvertArgs {
     /// The settings that `append` and `verify --against` need to read the same samples again.
     fn settings(&self) -> Vec<(String, String)> {
         let frames = self.select.frames.map(|f| ("frames".to_string(), f.to_string()));
-        let region = self.select.region.map(|r| ("region".to_string(), r.to_string()));
+        let region = self.select.region.as_ref().map(|r| ("region".to_string(), r.to_string()));
         let given = [frames, region].into_iter().flatten();
         given.chain(self.input.settings().map(|(name, value)| (name.to_string(), value))).collect()
     }

@@ -1,7 +1,7 @@
 //! Annotations around the volume.
 
-use super::axes::Axes;
 use super::format::is_page;
+use crate::axes::Axes;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
 use wavesplat_core::base::error::Result;
@@ -77,7 +77,7 @@ pub(in crate::picture) fn volume_axes(
     config: &RenderConfig,
     exaggeration: f64,
 ) -> Result<VolumeAxes> {
-    let region = request.region.map_or(Ok(whole.whole()), |region| region.resolve(whole))?;
+    let region = request.region.as_ref().map_or(Ok(whole.whole()), |region| axes.region("region", region))?;
     Ok(axes_of_region(axes.labels(), whole, region, config, exaggeration))
 }
 

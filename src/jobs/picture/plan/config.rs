@@ -3,6 +3,7 @@
 use super::camera_path::{frames_of_views, is_moving};
 use super::modes;
 use super::views::{fixed, views};
+use crate::axes::Axes;
 use crate::picture::request::PictureRequest;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::{Grid, Region};
@@ -19,6 +20,7 @@ pub(in crate::picture) fn render_config(
     request: &PictureRequest,
     scene: &dyn Scene,
     file: Option<&CoefficientFile>,
+    axes: &Axes,
     colours: Option<&TransferFunction>,
     all: usize,
     memory: usize,
@@ -36,7 +38,7 @@ pub(in crate::picture) fn render_config(
         views: if lod == 0 { views } else { fixed(&views, &whole)? },
         kernel: Kernel::new(request.sigma, request.tau, grid)?,
         quantity: request.quantity,
-        region: region_of(request, &whole, lod)?,
+        region: region_of(request, axes, lod)?,
         splat_error: request.splat_error.unwrap_or(default_splat_error(tolerance)),
         fast: request.fast,
         allowed,
@@ -64,8 +66,10 @@ fn with_unit_of(whole: &Grid, mode: Mode) -> Mode {
 }
 
 /// The voxels to render, on the lattice of a level of detail.
-fn region_of(request: &PictureRequest, whole: &Grid, lod: u32) -> Result<Option<Region>> {
-    let Some(region) = request.region.map(|r| r.resolve(whole)).transpose()? else { return Ok(None) };
+fn region_of(request: &PictureRequest, axes: &Axes, lod: u32) -> Result<Option<Region>> {
+    let Some(region) = request.region.as_ref().map(|region| axes.region("region", region)).transpose()? else {
+        return Ok(None);
+    };
     let region = region.every(1 << lod);
     if region.is_empty() {
         return Err(Error::setting("region", format!("holds no voxel with `lod` {lod}")));

@@ -1,7 +1,5 @@
 //! A request resolved against what it draws: from names to numbers, places, colours and files.
 
-pub(super) mod units;
-pub(super) mod axes;
 pub(super) mod named_colours;
 pub(super) mod modes;
 mod format;
@@ -61,7 +59,7 @@ impl Plan {
             Opened::new(session, request, reporter)?;
         let all = scene.frames().unwrap_or(0);
         let mut config =
-            render_config(request, scene.as_ref(), file.as_deref(), colours.as_ref(), all, session.memory)?;
+            render_config(request, scene.as_ref(), file.as_deref(), &axes, colours.as_ref(), all, session.memory)?;
         let (whole, lod) = file.as_ref().map_or((*scene.grid(), 0), |file| (file.whole_grid(), file.lod()));
         set_planes(&mut config, request, &axes, scene.grid(), &whole, lod)?;
         let targets = AllTargets::new(request, session.paths(), &config)?;

@@ -1,17 +1,17 @@
 //! The scene of a request: an open coefficient file, or frames.
 
 use super::annotations::annotation;
-use super::axes::Axes;
 use super::config::frames_of;
 use super::modes;
 use super::named_colours::colours_of_source;
-use super::units::{values_of, values_of_archive};
 use super::views::{face_on, has_own_view, views};
+use crate::axes::Axes;
 use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
 use crate::picture::session::{FRAMES_HINT, Session};
 use crate::picture::values::{Detail, Exaggeration};
+use crate::units::{values_of, values_of_archive};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat_core::base::description::{coordinates, is_regular};

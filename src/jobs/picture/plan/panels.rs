@@ -1,8 +1,8 @@
 //! Three slices side by side, each face-on in its own part of the picture.
 
 use super::annotations::picture_margins;
-use super::axes::Axes;
 use super::views::{across_and_up, has_own_view, view_across};
+use crate::axes::Axes;
 use crate::picture::request::PictureRequest;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Grid;

@@ -1,7 +1,7 @@
 //! Slices: planes through the volume.
 
-use super::axes::Axes;
 use super::views::face_on;
+use crate::axes::Axes;
 use crate::picture::request::PictureRequest;
 use crate::picture::values::SliceSpec;
 use wavesplat_core::base::error::{Error, Result};

@@ -1,9 +1,9 @@
 //! The views of a run.
 
 use super::annotations::picture_margins;
-use super::axes::Axes;
 use super::camera_path::{Stand, is_moving, stands};
 use super::modes::mode_name;
+use crate::axes::Axes;
 use crate::picture::request::PictureRequest;
 use crate::picture::values::{Convention, ModeName};
 use wavesplat_core::base::error::Result;

@@ -3,13 +3,13 @@
 mod chart;
 mod table;
 
-use super::plan::axes::Axes;
 use super::plan::config::frames_of;
 use super::report::Outcome;
 use super::reporter::Reporter;
 use super::request::PictureRequest;
 use super::session::Session;
 use super::values::PointSpec;
+use crate::axes::Axes;
 use crate::extract::{ExtractConfig, ExtractReport, extract_to};
 use crate::report::report_text;
 use serde::Serialize;
@@ -20,8 +20,8 @@ use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::inputs::spare_inputs;
 use wavesplat_core::base::output::{Output, STANDARD};
+use wavesplat_core::base::position::RegionSpec;
 use wavesplat_core::base::sample::{is_missing, load};
-use wavesplat_core::base::values::RegionSpec;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::render::SplatSource;
 use wavesplat_engine::render::planes::Taps;
@@ -162,7 +162,7 @@ fn all_probes(request: &PictureRequest, file: &CoefficientFile, axes: &Axes) -> 
         Ok((name.join(" "), Probe::Point(Taps::new(at, &whole))))
     };
     let region = |spec: &RegionSpec| {
-        let region = spec.resolve(&file.grid).map_err(renamed)?;
+        let region = axes.region("probe_region", spec)?;
         Ok((spec.to_string(), Probe::Region(region)))
     };
     request.probe.iter().map(point).chain(request.probe_region.iter().map(region)).collect()
@@ -208,14 +208,6 @@ fn series_of_sums(name: &str, probe: &Probe, sums: &[Sum]) -> Vec<Series> {
         Probe::Region(_) => {
             vec![series("mean ", Sum::mean), series("min ", |sum| sum.least), series("max ", |sum| sum.most)]
         }
-    }
-}
-
-/// The error of a region, by the name of the field that gave it.
-fn renamed(error: Error) -> Error {
-    match error {
-        Error::Setting { setting: "region", problem, .. } => Error::setting("probe_region", problem),
-        other => other,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Series;
 use super::chart::{Band, Chart, Line};
-use crate::picture::plan::units::attribute_text;
+use crate::units::attribute_text;
 use std::fmt::Write as _;
 use wavesplat_core::base::decimal;
 use wavesplat_core::base::error::Result;

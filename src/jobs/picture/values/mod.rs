@@ -10,6 +10,6 @@ mod view_angles;
 pub use automatic::{BeyondSpec, ClearSpec, Detail, Exaggeration};
 pub use choices::{Convention, ModeName, Theme};
 pub use hex_colour::HexColour;
-pub use position::{AxisPosition, PointSpec, SliceSpec};
+pub use position::{PointSpec, SliceSpec};
 pub use surfaces::SurfaceList;
 pub use view_angles::ViewAngles;

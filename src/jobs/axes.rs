@@ -1,16 +1,17 @@
 //! The axes of all voxels: their names, units and coordinates, and positions along them in voxels.
 
 use super::units::{attribute_text, in_letters};
-use crate::picture::values::AxisPosition;
+use std::ops::Range;
 use wavesplat_core::base::description::{Description, coordinates, sides, unwrap_degrees};
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::grid::Grid;
+use wavesplat_core::base::grid::{Grid, Region};
+use wavesplat_core::base::position::{AxisPosition, Ends, RegionSpec};
 use wavesplat_engine::file::{CoefficientFile, setting};
 use wavesplat_engine::render::annotate::AxisLabels;
 
 /// An axis of voxels.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Axis {
+struct Axis {
     /// The names that options may use; the first is the one that is shown.
     names: Vec<String>,
     unit: String,
@@ -22,16 +23,16 @@ pub(crate) struct Axis {
 
 /// The axes x, y and z of all voxels, at their true places.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Axes([Axis; 3]);
+pub struct Axes([Axis; 3]);
 
 impl Axes {
     /// The axes of a grid with true heights, with names and units from the source's description. `unit` is that of the grid, if it is known.
-    pub(crate) fn new(grid: &Grid, unit: Option<&str>, description: Option<&Description>) -> Self {
+    pub fn new(grid: &Grid, unit: Option<&str>, description: Option<&Description>) -> Self {
         Self(std::array::from_fn(|along| Axis::new(grid, unit, description, along)))
     }
 
     /// The axes of a coefficient file.
-    pub(crate) fn from_file(file: &CoefficientFile) -> Result<Self> {
+    pub fn from_file(file: &CoefficientFile) -> Result<Self> {
         let m = file.metadata();
         let grid = Grid { dims: m.dims.map(|n| n as usize), spacing: m.spacing, origin: m.origin };
         Ok(Self::new(&grid, setting(m, "space-units"), file.description()?.as_ref()))
@@ -52,6 +53,22 @@ impl Axes {
                 Err(Error::setting(field, format!("no axis '{name}'; the axes are {}", known.join(", "))))
             }
         }
+    }
+
+    /// The voxels of a box that a field names.
+    ///
+    /// # Errors
+    /// An end that is none, or a box that is empty or not within the volume.
+    pub fn region(&self, field: &'static str, spec: &RegionSpec) -> Result<Region> {
+        let [x, y, z] = [0, 1, 2].map(|axis| self.0[axis].range(&spec.0[axis]));
+        let ranges = x.and_then(|x| Ok([x, y?, z?])).map_err(|what| Error::setting(field, what))?;
+        let region = Region { start: ranges.each_ref().map(|range| range.start), end: ranges.map(|range| range.end) };
+        let dims = self.0.each_ref().map(|axis| axis.at.len());
+        if !(Region { start: [0; 3], end: dims }).contains(&region) || region.is_empty() {
+            let [x, y, z] = dims;
+            return Err(Error::setting(field, format!("empty, or not within the volume of {x}x{y}x{z} voxels")));
+        }
+        Ok(region)
     }
 
     /// A place along an axis, in voxels.
@@ -132,6 +149,51 @@ impl Axis {
         }
     }
 
+    /// The voxels between the ends of a box: with coordinates, those from the one to the other.
+    fn range(&self, ends: &Ends) -> std::result::Result<Range<usize>, String> {
+        let Ends { from, to } = ends;
+        if let (Some(AxisPosition::Coordinate(a, of_a)), Some(AxisPosition::Coordinate(b, of_b))) = (from, to) {
+            self.check_unit(of_a).and_then(|()| self.check_unit(of_b))?;
+            let [first, last] = [self.place_or_beyond(*a)?, self.place_or_beyond(*b)?];
+            let is_turned = first > last && (a < b) == (self.at[0] < self.at[self.at.len() - 1]);
+            if is_turned {
+                return Err(format!(
+                    "{a} to {b} crosses the ends of the axis {}: take its two sides one by one",
+                    self.names[0]
+                ));
+            }
+            return Ok(whole_from(first.min(last))..whole_up_to(first.max(last)));
+        }
+        let first = from.as_ref().map_or(Ok(0), |from| self.end(from, whole_from))?;
+        let last = to.as_ref().map_or(Ok(self.at.len()), |to| self.end(to, whole_up_to))?;
+        Ok(first..last)
+    }
+
+    /// The voxel at an end of a box. `whole` gives that of a coordinate between two.
+    fn end(&self, place: &AxisPosition, whole: fn(f64) -> usize) -> std::result::Result<usize, String> {
+        match place {
+            AxisPosition::Voxel(voxel) if *voxel >= 0.0 && voxel.fract() == 0.0 => Ok(*voxel as usize),
+            AxisPosition::Voxel(voxel) => Err(format!("a box ends at whole voxels, not at #{voxel}")),
+            AxisPosition::Share(share) if (0.0..=1.0).contains(share) => {
+                Ok((share * self.at.len() as f64).round() as usize)
+            }
+            AxisPosition::Share(_) => self.voxel(place).map(|_| 0),
+            AxisPosition::Coordinate(at, unit) => {
+                self.check_unit(unit).and_then(|()| self.place_or_beyond(*at)).map(whole)
+            }
+        }
+    }
+
+    /// The place of a coordinate in voxels; half a voxel beyond the first or the last if it is beyond.
+    fn place_or_beyond(&self, at: f64) -> std::result::Result<f64, String> {
+        let [first, last] = [self.at[0], self.at[self.at.len() - 1]];
+        self.index(at).or_else(|what| match (at < first.min(last), at > first.max(last)) {
+            (true, _) => Ok(if first <= last { -0.5 } else { self.at.len() as f64 - 0.5 }),
+            (_, true) => Ok(if first <= last { self.at.len() as f64 - 0.5 } else { -0.5 }),
+            _ => Err(what),
+        })
+    }
+
     fn check_unit(&self, unit: &str) -> std::result::Result<(), String> {
         let metres = ["m", "meter", "meters", "metre", "metres"];
         let alike = metres.contains(&unit) && metres.contains(&self.unit.as_str());
@@ -172,6 +234,19 @@ impl Axis {
         let share = voxel - low as f64;
         if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
     }
+}
+
+/// Places this near to a voxel are there, in voxels.
+const ROUNDING: f64 = 1e-9;
+
+/// The first voxel from a place on.
+fn whole_from(place: f64) -> usize {
+    (place - ROUNDING).ceil() as usize
+}
+
+/// The voxel after the last one up to a place.
+fn whole_up_to(place: f64) -> usize {
+    ((place + ROUNDING).floor() + 1.0) as usize
 }
 
 /// Whether an axis of an array has no coordinates, and only the spacing of one that has: its voxels are counted.
@@ -215,6 +290,33 @@ mod tests {
         let expected = [("x", 1.0), ("y", 6.0), ("z", 12.0)].map(|(name, at)| (name.into(), "mm".into(), Some(at)));
         assert_eq!(titles, expected);
         assert!(axes.compare(0, 2) && Axes::new(&grid, None, None).labels()[0].unit.is_empty());
+    }
+
+    #[test]
+    fn boxes_end_at_voxels_shares_and_coordinates() {
+        let (up, down) = (axis(&[0.0, 10.0, 50.0, 100.0]), axis(&[100.0, 50.0, 10.0, 0.0]));
+        let range = |axis: &Axis, text: &str| text.parse().and_then(|ends| axis.range(&ends));
+        for (text, ascending, descending) in [
+            ("1:3", 1..3, 1..3),
+            (":", 0..4, 0..4),
+            ("50%:#4", 2..4, 2..4),
+            ("@10:@50", 1..3, 1..3),
+            ("@5m:@60m", 1..3, 1..3),
+            ("@-10:@200", 0..4, 0..4),
+            ("@11:", 2..4, 2..4),
+            ("@60:@70", 3..3, 1..1),
+            ("@200:@300", 4..4, 0..0),
+        ] {
+            assert_eq!((range(&up, text), range(&down, text)), (Ok(ascending), Ok(descending)), "{text}");
+        }
+        assert_eq!(range(&down, "@50:@10"), Ok(1..3));
+        for wrong in ["#1.5:", "120%:", "@5km:", "@-5s:"] {
+            assert!(range(&up, wrong).is_err(), "{wrong}");
+        }
+        let mut lon = axis(&[0.0, 90.0, 180.0, 270.0]);
+        lon.unit = "degrees_east".into();
+        assert_eq!(range(&lon, "@80:@200"), Ok(1..3));
+        assert!(range(&lon, "@-100:@100").is_err_and(|what| what.contains("crosses the ends")));
     }
 
     #[test]

@@ -6,13 +6,13 @@ use wavesplat_core::source::Archive;
 use wavesplat_engine::file::{CoefficientFile, setting};
 
 /// The name and the unit of a file's values.
-pub(in crate::picture) fn values_of(file: &CoefficientFile) -> Result<String> {
+pub(crate) fn values_of(file: &CoefficientFile) -> Result<String> {
     let (m, description) = (file.metadata(), file.description()?);
     Ok(named(m.variable.as_deref(), setting(m, "units"), description.as_ref()))
 }
 
 /// The name and the unit of an archive's values.
-pub(in crate::picture) fn values_of_archive(archive: &Archive) -> String {
+pub(crate) fn values_of_archive(archive: &Archive) -> String {
     named(archive.variable.as_deref(), archive.units.samples.as_deref(), archive.description.as_ref())
 }
 
@@ -26,7 +26,7 @@ fn named(variable: Option<&str>, unit: Option<&str>, description: Option<&Descri
 }
 
 /// The text of an attribute.
-pub(in crate::picture) fn attribute_text(attributes: &[Attribute], name: &str) -> Option<String> {
+pub(crate) fn attribute_text(attributes: &[Attribute], name: &str) -> Option<String> {
     match &attributes.iter().find(|attribute| attribute.name == name)?.value {
         Values::Texts(texts) => texts.first().map(|text| text.trim().to_string()),
         _ => None,
@@ -34,7 +34,7 @@ pub(in crate::picture) fn attribute_text(attributes: &[Attribute], name: &str) -
 }
 
 /// A unit as people write it: °C, and m s⁻¹ for "m s-1".
-pub(in crate::picture) fn in_letters(unit: &str) -> String {
+pub(crate) fn in_letters(unit: &str) -> String {
     match unit.trim() {
         "degC" | "deg_C" | "degree_C" | "degrees_C" | "celsius" | "Celsius" => "°C".into(),
         "degrees_north" | "degree_north" => "°N".into(),
