@@ -162,8 +162,18 @@ fn the_largest_value_is_that_of_brute_force() {
         let config = seen(view, &GRID, Mode::Mip { slices: Some(4) });
         let file = exact(&samples, SchemeConstraint::AUTO);
         let (found, _) = pictures(&mut scene(&file), &config);
+        let camera = Camera::new(&view, &GRID).unwrap();
         let expected = brute_force((&GRID, &config), &samples, |rays, pixel| {
-            let [low, high] = [0.3, 0.5].map(|least| rays.largest(pixel, STEPS, least));
+            let (from, along) = camera.ray(pixel.map(|n| n as f64 + 0.5));
+            let largest = |beyond: f64| {
+                let place = |a: usize, depth: f64| (from[a] + depth * along[a] - GRID.origin[a]) / GRID.spacing[a];
+                let is_within = |depth: f64| {
+                    let end = |a: usize| GRID.dims[a] as f64 - 0.5 + beyond;
+                    (0..3).all(|a| (-0.5 - beyond..=end(a)).contains(&place(a, depth)))
+                };
+                rays.largest(pixel, STEPS, &is_within)
+            };
+            let [low, high] = [0.15, -0.15].map(largest);
             vec![Some(low).filter(|low| (low - high).abs() < 1e-3)]
         });
         let off = largest_difference(&found, &expected);

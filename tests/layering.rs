@@ -59,7 +59,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
             "engine/render/batches/sampled.rs",
             "engine/render/renderer.rs",
             "engine/render/sink/mod.rs",
-            "engine/render/sink/ray_lengths.rs",
+            "engine/render/ray_lengths.rs",
             "engine/render/planes/",
             "engine/render/slices/",
             "engine/render/splat/accumulator.rs",

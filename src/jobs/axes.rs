@@ -97,11 +97,6 @@ impl Axes {
         self.0[axis].sides
     }
 
-    /// Whether the volume is of a body.
-    pub(crate) fn is_of_body(&self) -> bool {
-        self.0.iter().any(|axis| axis.sides.is_some())
-    }
-
     /// The name of an axis.
     pub(crate) fn name(&self, axis: usize) -> &str {
         &self.0[axis].names[0]

@@ -71,15 +71,10 @@ fn three_slices_across_all_axes_stand_side_by_side() {
     let work = Work::new();
     let archive = Archive::smooth([20, 14, 6], 2);
     work.write("a.npy", archive.npy());
-    for (size, options) in [([300, 120], ""), ([200, 200], "--annotate=axes"), ([120, 300], "")] {
+    for size in [[300, 120], [200, 200], [120, 300]] {
         let common = format!("a.npy --method direct --frames 1 --size {}x{}", size[0], size[1]);
         let slices = "--slice y=#6 --slice x=#9 --slice z=#2"; // in any order
-        let plain = if options.is_empty() { picture(&work, &format!("{common} {slices}")) } else { Vec::new() };
-        let png = work.render(&format!("{common} {slices} {options} -o - --format png --colormap grey")).ok().out;
-        assert_eq!(decode_png(&png).len(), 3 * size[0] * size[1]);
-        if plain.is_empty() {
-            continue;
-        }
+        let plain = picture(&work, &format!("{common} {slices}"));
         let found = rectangles(&plain, size[0]);
         assert_eq!(found.len(), 3, "{size:?}: {found:?}");
         let mut seen = Vec::new();
@@ -104,8 +99,10 @@ fn three_slices_across_all_axes_stand_side_by_side() {
         }
         seen.sort_unstable();
         assert_eq!(seen, [0, 1, 2]);
-        let within = picture(&work, &format!("{common} {slices} --view 30,30"));
-        assert!(rectangles(&within, size[0]) != rectangles(&plain, size[0]), "within the volume on request");
+        for other in ["--view 30,30", "--scale 2", "--roll 90"] {
+            let within = picture(&work, &format!("{common} {slices} {other}"));
+            assert!(rectangles(&within, size[0]) != rectangles(&plain, size[0]), "within the volume with {other}");
+        }
     }
 }
 
@@ -120,7 +117,9 @@ fn bodies_are_grey_and_a_few_bright_spots_do_not_darken_them() {
     assert!(colours("--colormap viridis") > 1000);
     let mut archive =
         Archive::of([30, 30, 12], 1, |x, y, _, _| if x.abs_diff(15) + y.abs_diff(15) < 12 { 500.0 } else { 4.0 });
-    archive.values.iter_mut().skip(17).step_by(700).for_each(|value| *value = 4000.0);
+    for spot in [13 * 30 + 11, 16 * 30 + 18] {
+        archive.values[6 * 900 + spot] = 4000.0; // 1 % of all pixels, 3 % of the body
+    }
     let head = "NRRD0004\ntype: float\ndimension: 3\nspace: RAS\nsizes: 30 30 12\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n\
                 space origin: (0,0,0)\nendian: little\nencoding: raw\n\n";
     let samples = archive.values.iter().flat_map(|value| value.to_le_bytes());

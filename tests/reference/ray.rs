@@ -61,16 +61,16 @@ impl Rays<'_> {
 
     /// The integral along the ray in `steps` steps.
     pub(crate) fn integral(&self, pixel: [usize; 2], steps: usize, medium: Medium<'_>) -> [f64; 4] {
-        blend(self.steps(pixel, steps, 1e-6).into_iter(), medium)
+        blend(self.steps(pixel, steps, 1e-6, &|_| true).into_iter(), medium)
     }
 
-    /// The largest mean at any of `steps` steps where the density is more than `least`.
-    pub(crate) fn largest(&self, pixel: [usize; 2], steps: usize, least: f64) -> f64 {
-        self.steps(pixel, steps, least).into_iter().map(|(_, mean)| mean).fold(f64::NAN, f64::max)
+    /// The largest mean at any of `steps` steps where the density is more than 0.01, at depths that are `within` something.
+    pub(crate) fn largest(&self, pixel: [usize; 2], steps: usize, within: &dyn Fn(f64) -> bool) -> f64 {
+        self.steps(pixel, steps, 0.01, within).into_iter().map(|(_, mean)| mean).fold(f64::NAN, f64::max)
     }
 
     /// Length and mean of each step where the density is more than `least`.
-    fn steps(&self, pixel: [usize; 2], steps: usize, least: f64) -> Vec<(f64, f64)> {
+    fn steps(&self, pixel: [usize; 2], steps: usize, least: f64, within: &dyn Fn(f64) -> bool) -> Vec<(f64, f64)> {
         let ([from, to], voxels) = (self.depths(), self.voxels(pixel));
         let (width, sigma) = ((to - from) / steps as f64, self.view.sigma);
         let across: Vec<f64> = voxels.iter().map(|voxel| self.across(voxel)).collect();
@@ -85,7 +85,8 @@ impl Rays<'_> {
             }
             (density * width, sum / density)
         };
-        (0..steps).map(step).filter(|(length, _)| *length > least * width).collect()
+        let steps = (0..steps).filter(|n| within(from + (*n as f64 + 0.5) * width));
+        steps.map(step).filter(|(length, _)| *length > least * width).collect()
     }
 }
 

@@ -50,9 +50,8 @@ pub(super) struct ColourArgs {
     /// the least value, or 0, if many pixels of small pictures are near it
     #[arg(long, value_name = "LO,HI", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     pub(super) clear: ClearSpec,
-    /// For means in colours: the value that rays meet beyond the volume, if all are taken for as long as the longest: so the
-    /// rim of a plate is no brighter than its middle. auto is the value of empty space, or the median; none shows plain
-    /// means
+    /// Means in colours: rays shorter than the longest one are filled up with this value, so that the rim of a volume does
+    /// not stand out. auto is the value of empty space, or the median; none shows plain means
     #[arg(long, value_name = "V", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     pub(super) beyond: BeyondSpec,
     /// Background colour, like ffffff [default: that of the theme]
@@ -103,8 +102,8 @@ pub(super) struct SampleArgs {
     /// Length in world units over which the opacities apply [default: the largest spacing]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true, help_heading = "Along the ray")]
     pub(super) opacity_unit: Option<f64>,
-    /// Isosurfaces: V, V:RRGGBB or V:RRGGBB:OPACITY, with commas between. V is a value, or a share of the range such as
-    /// 40% [default: 50%; colours of
+    /// Isosurfaces: V, V:RRGGBB or V:RRGGBB:OPACITY, with commas between. V is a value like 280 or @280, or a share of the
+    /// range such as 40% [default: 50%; colours of
     /// --transfer-function; opaque if there is one, else 0.6]
     #[arg(long, value_name = "V,...", allow_hyphen_values = true, help_heading = "Along the ray")]
     pub(super) iso: Option<SurfaceList>,

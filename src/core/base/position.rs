@@ -79,7 +79,7 @@ impl FromStr for Ends {
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         let end = |text: &str| if text.trim().is_empty() { Ok(None) } else { end(text).map(Some) };
-        let (from, to) = text.split_once(':').ok_or_else(wrong_box)?;
+        let (from, to) = text.split_once(':').filter(|(_, to)| !to.contains(':')).ok_or_else(wrong_box)?;
         Ok(Self { from: end(from)?, to: end(to)? })
     }
 }

@@ -20,10 +20,11 @@ impl At {
     /// # Errors
     /// A text that is neither, or a share that is not from 0 to 1.
     pub fn parse(text: &str, plain: fn(f64) -> Self) -> Result<Self, String> {
-        let at = match text.trim().strip_prefix('@') {
+        let text = text.trim();
+        let at = match text.strip_prefix('@') {
             Some(value) => value.parse().ok().map(Self::Value),
             None if text.ends_with('%') => share(text).ok().map(Self::Share),
-            None => text.trim().parse().ok().map(plain),
+            None => text.parse().ok().map(plain),
         };
         let is_sound = |at: &Self| match at {
             Self::Share(share) => (0.0..=1.0).contains(share),
@@ -71,6 +72,14 @@ pub enum Opacities {
 }
 
 impl OpacityPoints {
+    /// The values at which opacities are given.
+    pub fn values(&self) -> impl Iterator<Item = f64> {
+        self.0.iter().filter_map(|point| match point.at {
+            At::Value(value) => Some(value),
+            At::Share(_) => None,
+        })
+    }
+
     /// The opacities at shares of a range.
     ///
     /// # Errors
@@ -138,7 +147,7 @@ mod tests {
         let points = |text: &str| text.parse::<OpacityPoints>();
         let shares = |text: &str| points(text).and_then(|points| points.at_shares((200.0, 300.0)));
         assert_eq!(shares("0:0,0.5:0.1,1:0.8"), Ok(vec![(0.0, 0.0), (0.5, 0.1), (1.0, 0.8)]));
-        assert_eq!(shares("25%:10%,@300:1"), Ok(vec![(0.25, 0.1), (1.0, 1.0)]));
+        assert_eq!(shares("25% : 10 %,@300:1"), Ok(vec![(0.25, 0.1), (1.0, 1.0)]));
         assert!(shares("@199:0").is_err_and(|what| what.contains("199 is beyond")));
         assert_eq!(points("@280:0.5,25%:0").expect("points").to_string(), "@280:0.5,0.25:0");
         for wrong in ["", "1", "2:0", "a:0", "@:0", "101%:0", "@nan:0"] {

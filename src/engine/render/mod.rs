@@ -54,6 +54,7 @@ pub mod planes;
 mod slices;
 mod projection;
 pub mod annotate;
+mod ray_lengths;
 pub mod page;
 pub mod sink;
 mod pictures;

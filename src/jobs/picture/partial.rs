@@ -8,7 +8,7 @@ use super::plan::modes::{check_slices, mode_name, unit};
 use super::plan::opened::Opened;
 use super::plan::provenance::provenance;
 use super::plan::ranges::Needed;
-use super::plan::ranges::{Ranges, rays};
+use super::plan::ranges::{KnownSamples, Ranges, rays};
 use super::plan::sinks::SinkInput;
 use super::plan::targets::AllTargets;
 use super::report::Outcome;
@@ -266,8 +266,7 @@ impl Sum<'_> {
             pictures: &targets.pictures,
             errors: None,
             colours: None,
-            is_of_body: setup.axes.iter().any(|axis| axis.sides.is_some()),
-            least: None,
+            known: KnownSamples { least: None, are_of_body: setup.axes.iter().any(|axis| axis.sides.is_some()) },
         };
         let ranges =
             |needed: Needed| if needed.pictures { self.ranges(&config, needed.beyond) } else { Ok(Ranges::default()) };

@@ -128,7 +128,8 @@ impl ViewerSession {
         let grid = file.as_ref().map_or(*scene.grid(), |file| file.whole_grid());
         let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
-        let opening = opening_frame(scene.as_mut(), file.as_deref(), self.session.memory, &Silent)?;
+        let frames = frames_of(&self.base, scene.frames().unwrap_or(0))?;
+        let opening = opening_frame(scene.as_mut(), file.as_deref(), &frames, self.session.memory, &Silent)?;
         let name = self.session.paths().first().map(|input| public_name(input));
         let name = name.as_deref().and_then(Path::file_name);
         Ok(Facts {

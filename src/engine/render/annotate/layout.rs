@@ -95,7 +95,7 @@ const TIME: f64 = 2.0;
 const LINES_FOR_AXES: f64 = 16.0;
 
 /// The height of a line of letters in a picture.
-pub(super) fn line(size: [usize; 2]) -> f64 {
+pub fn line(size: [usize; 2]) -> f64 {
     (LINE * size[0].min(size[1]) as f64).max(LEAST_LINE)
 }
 

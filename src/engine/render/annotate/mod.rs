@@ -13,7 +13,7 @@ mod axis;
 mod bar;
 
 pub use canvas::over;
-pub use layout::{Margins, Parts, margins};
+pub use layout::{Margins, Parts, line, margins};
 pub use text::Letters;
 pub use ticks::round_values;
 pub use volume::{AxisLabels, VolumeAxes};
@@ -138,45 +138,15 @@ impl Annotation {
     ) {
         if self.panels.is_empty() {
             let camera = camera(&axes.grid, size, view);
-            camera.iter().for_each(|camera| self.draw_volume(canvas, axes, camera, opacity));
+            camera.iter().for_each(|camera| draw_volume(self.parts, canvas, axes, camera, opacity));
         }
-        for panel in &self.panels {
+        for (n, panel) in self.panels.iter().enumerate() {
             let Ok(camera) = Camera::new(&panel.view, &axes.grid) else { continue };
             if self.parts.axes && has_axes(size) {
                 axes.write_place(canvas, &camera, panel);
             }
-            self.draw_volume(canvas, axes, &camera, opacity);
-        }
-    }
-
-    /// The box behind the picture, and the axes beside it.
-    fn draw_volume(&self, canvas: &mut Canvas<'_>, axes: &VolumeAxes, camera: &Camera, opacity: &dyn Fn(usize) -> f64) {
-        if self.parts.bounds {
-            let (size, ink, width) = (canvas.letters.size, canvas.ink, canvas.width);
-            let mut shares = vec![0.0_f64; canvas.pixels.len()];
-            axes.draw_box(camera, size, |x, y, share| {
-                let at = y as usize * width + x as usize;
-                shares[at] = shares[at].max(share);
-            });
-            for (at, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
-                if canvas.is_taken(at) {
-                    continue;
-                }
-                canvas.pixels[at] = over(canvas.pixels[at], ink, BOX * share * (1.0 - opacity(at)));
-            }
-        }
-        if self.parts.scale && has_bar(camera.size) {
-            axes.draw_scale(canvas, camera);
-        }
-        if has_axes(camera.size) {
-            behind(canvas, opacity, |canvas| {
-                if self.parts.axes {
-                    axes.draw_axes(canvas, camera);
-                }
-                if self.parts.triad {
-                    axes.draw_triad(canvas, camera);
-                }
-            });
+            let parts = Parts { triad: false, scale: self.parts.scale && n == 0, ..self.parts };
+            draw_volume(parts, canvas, axes, &camera, opacity);
         }
     }
 
@@ -217,6 +187,43 @@ impl Annotation {
         let letters = Letters::new(layout::line(size));
         let title = self.placed_title(&letters, size[0] as f64, frame, None).filter(|_| has_time(size))?;
         Some(title.text).filter(|text| *text != self.title)
+    }
+}
+
+/// The box behind the picture, and the axes beside it.
+fn draw_volume(
+    parts: Parts,
+    canvas: &mut Canvas<'_>,
+    axes: &VolumeAxes,
+    camera: &Camera,
+    opacity: &dyn Fn(usize) -> f64,
+) {
+    if parts.bounds {
+        let (size, ink, width) = (canvas.letters.size, canvas.ink, canvas.width);
+        let mut shares = vec![0.0_f64; canvas.pixels.len()];
+        axes.draw_box(camera, size, |x, y, share| {
+            let at = y as usize * width + x as usize;
+            shares[at] = shares[at].max(share);
+        });
+        for (at, share) in shares.into_iter().enumerate().filter(|(_, share)| *share > 0.0) {
+            if canvas.is_taken(at) {
+                continue;
+            }
+            canvas.pixels[at] = over(canvas.pixels[at], ink, BOX * share * (1.0 - opacity(at)));
+        }
+    }
+    if parts.scale && has_bar(camera.size) {
+        axes.draw_scale(canvas, camera);
+    }
+    if has_axes(camera.size) {
+        behind(canvas, opacity, |canvas| {
+            if parts.axes {
+                axes.draw_axes(canvas, camera);
+            }
+            if parts.triad {
+                axes.draw_triad(canvas, camera);
+            }
+        });
     }
 }
 

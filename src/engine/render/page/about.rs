@@ -2,6 +2,7 @@
 
 use crate::render::Pixel;
 use crate::render::annotate::Annotation;
+use crate::render::ray_lengths::SeenRays;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde::Serialize;
@@ -42,9 +43,8 @@ pub struct About {
     pub(crate) opening: usize,
     /// The backdrop of each view, which lies behind its pictures, as the address of a PNG.
     pub(crate) backdrops: Vec<Option<String>>,
-    /// The lengths of the rays of each view, by which its values are weighed before they are coloured: shares of the longest one, as
-    /// the address of a PNG whose red and green are the high and the low byte.
-    pub(crate) shares: Vec<Option<String>>,
+    /// The rays of each view, by whose lengths its values are weighed before they are coloured.
+    pub(crate) rays: Vec<Option<SeenRays>>,
     /// The value beyond the volume, with which values are weighed.
     pub(crate) beyond: f32,
     /// How the pictures were made.
@@ -81,7 +81,7 @@ impl About {
             sequences: Vec::new(),
             opening: 0,
             backdrops: Vec::new(),
-            shares: Vec::new(),
+            rays: Vec::new(),
             beyond: 0.0,
             settings: serde_json::Value::Null,
         })

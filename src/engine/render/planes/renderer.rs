@@ -13,6 +13,8 @@ use wavesplat_core::view::camera::View;
 pub(in crate::render) struct Planes {
     /// The panels of each view's picture.
     views: Vec<Vec<PlanesView>>,
+    /// The view of the first panel, if there are panels.
+    first: Option<View>,
 }
 
 impl Planes {
@@ -34,7 +36,7 @@ impl Planes {
             }
             _ => Err(Error::setting("planes", "takes a panel of the picture's size for each plane, or none")),
         });
-        Ok(Self { views: views.collect::<Result<_>>()? })
+        Ok(Self { views: views.collect::<Result<_>>()?, first: panels.first().copied() })
     }
 }
 
@@ -52,7 +54,7 @@ impl Renderer for Planes {
             method: "planes",
             stated_splat_error: none,
             expected_error: none,
-            ..ViewReport::new(view, &panels[0].camera)
+            ..ViewReport::new(self.first.as_ref().unwrap_or(view), &panels[0].camera)
         };
         config.views.iter().zip(&self.views).map(report).collect()
     }

@@ -7,16 +7,15 @@ mod movie;
 mod ours;
 mod page;
 mod provenance;
-mod ray_lengths;
 mod png;
 mod sheet;
 mod stream;
 
+pub use super::ray_lengths::{RayLengths, Weighing, weighed};
 pub use movie::MovieFormat;
 pub use ours::is_ours;
 pub use page_encoder::{BlockOfFrames, PageEncoder};
 pub use provenance::{Provenance, Shows};
-pub use ray_lengths::{RayLengths, Weighing, weighed};
 
 use super::annotate::{Annotation, Finished};
 use super::batches::Scene;
@@ -216,16 +215,16 @@ impl SinkConfig {
     }
 
     /// The numbers of a picture as they are coloured.
-    fn weighed<'p>(&self, rendered: &Rendered<'_>, picture: Picture<'p>) -> Cow<'p, [f32]> {
+    fn as_coloured<'p>(&self, rendered: &Rendered<'_>, picture: Picture<'p>) -> Cow<'p, [f32]> {
         let view = rendered.views.get(rendered.view);
         let Some((weighing, view)) = self.weighing.as_ref().zip(view) else { return picture.into() };
         let shares = weighing.rays.shares(view, self.size);
-        picture.iter().zip(shares).map(|(mean, share)| weighing.value(*mean, share)).collect()
+        picture.iter().zip(shares).map(|(mean, share)| weighed(*mean, share, weighing.beyond)).collect()
     }
 
     /// A coloured picture with its annotations.
     fn image(&self, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<Rgb> {
-        let picture = &*self.weighed(rendered, picture);
+        let picture = &*self.as_coloured(rendered, picture);
         self.annotated(rendered, picture)
     }
 
@@ -255,7 +254,7 @@ impl SinkConfig {
 
     /// The same as [`Self::image`], with 16 bits per channel; annotations have 8.
     fn deep_image(&self, rendered: &Rendered<'_>, picture: Picture<'_>) -> Vec<[u16; 3]> {
-        let picture = &*self.weighed(rendered, picture);
+        let picture = &*self.as_coloured(rendered, picture);
         let deep = |pixel| self.colours.exact_colour_of_pixel(pixel).map(|c| (c * 65535.0).round() as u16);
         let mut image: Vec<[u16; 3]> = picture.chunks_exact(self.pixel.numbers()).map(deep).collect();
         if self.annotation.is_some() {

@@ -1,6 +1,6 @@
 //! Pictures as a web page takes them: a description, and blocks of pictures.
 
-use super::{Depth, Rendered, SinkConfig, Weighing, png};
+use super::{Depth, Rendered, SinkConfig, png};
 use crate::render::annotate::{Annotation, angles_of};
 use crate::render::page::{About, Planes, Sequence, opening, spread};
 use crate::render::{Picture, Pixel, ViewReport};
@@ -70,7 +70,7 @@ impl PageEncoder {
             fps: config.fps,
             sequences: sequences(&config.shown),
             backdrops: vec![None; views],
-            shares: vec![None; views],
+            rays: vec![None; views],
             beyond: config.weighing.as_ref().map_or(0.0, |weighing| weighing.beyond),
             settings: serde_json::to_value(&*config.provenance).unwrap_or_default(),
             ..about
@@ -132,9 +132,8 @@ impl PageEncoder {
         if self.about.backdrops[rendered.view].is_none() {
             self.about.backdrops[rendered.view] = self.backdrop(view)?;
         }
-        if self.about.shares[rendered.view].is_none() {
-            self.about.shares[rendered.view] = self.shares(view)?;
-        }
+        let weighing = self.config.weighing.as_ref();
+        self.about.rays[rendered.view] = weighing.and_then(|weighing| weighing.rays.seen(view, self.config.size));
         Ok(())
     }
 
@@ -145,18 +144,6 @@ impl PageEncoder {
         self.annotation.draw_still(&mut pixels, size, background, view);
         let is_drawn = pixels.iter().any(|pixel| *pixel != background);
         is_drawn.then(|| self.address(&pixels)).transpose()
-    }
-
-    /// The lengths of the rays of a view, as shares of the longest one: a PNG whose red and green are the high and the low byte.
-    fn shares(&self, view: &ViewReport) -> Result<Option<String>> {
-        let bytes = |share: f32| {
-            let [low, high] = ((65535.0 * share).round() as u16).to_le_bytes();
-            [high, low, 0]
-        };
-        let pixels = |weighing: &Weighing| -> Vec<Rgb> {
-            weighing.rays.shares(view, self.config.size).into_iter().map(bytes).collect()
-        };
-        self.config.weighing.as_ref().map(|weighing| self.address(&pixels(weighing))).transpose()
     }
 
     /// The address of a PNG that it contains whole.

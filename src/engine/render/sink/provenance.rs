@@ -27,7 +27,7 @@ pub struct Provenance {
     /// Attenuation per world unit of depth.
     pub tau: f64,
     /// Standard deviation of the kernel in world units.
-    pub sigma: f64,
+    pub sigma: Option<f64>,
     /// The factor by which heights are drawn taller, if they are.
     pub exaggerate: Option<f64>,
     /// The level of detail, if pictures show every 2^lod-th voxel along each axis.

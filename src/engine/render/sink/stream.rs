@@ -39,7 +39,7 @@ pub(super) fn write(
         PictureFormat::Npy if !config.coloured_array => write_numbers(picture, f32::to_le_bytes, out),
         PictureFormat::Gray16 => {
             let level = |v: f32| ((config.colours.share(v) * 65535.0).round() as u16).to_le_bytes();
-            write_numbers(&config.weighed(rendered, picture), level, out)
+            write_numbers(&config.as_coloured(rendered, picture), level, out)
         }
         PictureFormat::Y4m => write_yuv(config.image(rendered, picture), config.size, out),
         PictureFormat::Npy | PictureFormat::Rgb24 | PictureFormat::Movie(_) | PictureFormat::Page => {

@@ -8,20 +8,24 @@ use super::view::SlicedView;
 use crate::render::batches::Units;
 use wavesplat_core::base::vectors::dispatch;
 
-/// The maximum along the ray.
+/// The maximum along the ray, within the box of the volume: half a voxel beyond the outermost voxels.
 pub(in crate::render) struct Largest {
-    /// Where the density is less, there is nothing.
-    least: f32,
+    /// Voxels along b, c and a.
+    count: [f32; 3],
 }
-
-/// The least density, as a share of that in the middle. It falls to a half at the faces of the volume.
-const NEAR: f64 = 0.4;
 
 impl Largest {
     /// The largest values within the volume of a view.
     pub(in crate::render) fn new(view: &SlicedView) -> Self {
-        Self { least: (NEAR * view.full_density()) as f32 }
+        Self { count: view.count.map(|n| n as f32) }
     }
+}
+
+/// Whether a place along an axis is within the box, but for rounding.
+#[inline(always)]
+fn is_within(at: f32, count: f32) -> bool {
+    const ROUNDING: f32 = 1e-3;
+    at >= -0.5 - ROUNDING && at <= count - 0.5 + ROUNDING
 }
 
 /// Sixteen cells.
@@ -56,8 +60,9 @@ impl Blend for Largest {
         Units { zero: middle, per: 1.0 / 16.0 }
     }
 
+    /// A value that hardly any sample supports is not taken for the largest.
     fn least(&self) -> f32 {
-        self.least
+        0.01
     }
 
     fn shows(&self, range: (f32, f32)) -> bool {
@@ -73,7 +78,10 @@ impl Blend for Largest {
     }
 
     fn add(&self, row: &Row<'_>, groups: RowGroups<'_, Peaks>) {
-        dispatch!(add(row, groups.live, groups.states, groups.limits));
+        let [_, c, a] = row.place;
+        if is_within(c, self.count[1]) && is_within(a, self.count[2]) {
+            dispatch!(add(row, self.count[0], groups.live, groups.states, groups.limits));
+        }
     }
 
     fn cells(group: &Peaks) -> Sixteen {
@@ -107,7 +115,8 @@ impl Blend for Largest {
     }
 
     fn step(&self, largest: &mut f64, point: &Point, _: f64) {
-        if point.density >= f64::from(self.least) {
+        let is_within = |axis: usize| is_within(point.place[axis] as f32, self.count[axis]);
+        if point.density >= f64::from(self.least()) && (0..3).all(is_within) {
             *largest = largest.max(point.value);
         }
     }
@@ -129,12 +138,12 @@ fn nearest(inner: [f32; 4], across: [f32; 4], down: [f32; 4]) -> f32 {
 }
 
 #[inline(always)]
-fn add(row: &Row<'_>, live: &[bool], groups: &mut [Peaks], limits: &mut [f32]) {
+fn add(row: &Row<'_>, count: f32, live: &[bool], groups: &mut [Peaks], limits: &mut [f32]) {
     for (n, (group, limit)) in groups.iter_mut().zip(limits).enumerate() {
         if !live[n] {
             continue;
         }
-        let values = if row.is_whole(n) {
+        let mut values = if row.is_whole(n) {
             row.sums(n)
         } else {
             let (mut means, lengths) = row.means(n);
@@ -143,6 +152,12 @@ fn add(row: &Row<'_>, live: &[bool], groups: &mut [Peaks], limits: &mut [f32]) {
             }
             means
         };
+        let first = row.place[0] + (n * GROUP) as f32;
+        if !(is_within(first, count) && is_within(first + (GROUP - 1) as f32, count)) {
+            for (i, value) in values.iter_mut().enumerate() {
+                *value = if is_within(first + i as f32, count) { *value } else { NONE };
+            }
+        }
         if group.slice.wrapping_add(1) != row.slice {
             (group.last, group.before) = ([NONE; GROUP], [NONE; GROUP]);
         }

@@ -296,15 +296,6 @@ impl SlicedView {
         (is_met || !slices.is_empty()).then_some(Slab { middle, slices, is_met })
     }
 
-    /// The density in the middle of the region: the largest one, unless samples are missing.
-    pub(super) fn full_density(&self) -> f64 {
-        let along = |i: usize| {
-            let taps = Taps::new((self.count[i] as f64 - 1.0) / 2.0, self.sigma[i]);
-            f64::from(taps.presence(0, self.count[i])) * taps.density
-        };
-        (0..3).map(along).product()
-    }
-
     /// The slice at a position along a.
     fn slice(&self, position: f64, number: usize) -> Slice {
         let cell = |i: usize, phase: usize| self.corner[i] as f64 + phase as f64 / self.cells as f64;

@@ -89,7 +89,7 @@ pub(in crate::picture) fn axes_of_region(
     config: &RenderConfig,
     exaggeration: f64,
 ) -> VolumeAxes {
-    let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. });
+    let has_kernel = !matches!(config.mode, Mode::Planes { .. } | Mode::Iso { .. } | Mode::Mip { .. });
     let rim = if has_kernel { rim(&config.kernel, whole) } else { 0.0 };
     let compares = labels[..2].iter().any(|across| across.compares_with(&labels[2]));
     VolumeAxes { grid: *whole, region, rim, exaggeration: if compares { exaggeration } else { 1.0 }, labels }

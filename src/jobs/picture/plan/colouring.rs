@@ -2,7 +2,7 @@
 
 use super::modes;
 use super::planes::{planes_of, with_planes};
-use super::ranges::{self, Needed, Ranges, is_of_means};
+use super::ranges::{self, KnownSamples, Needed, Ranges, is_of_means};
 use super::targets::Targets;
 use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
 use crate::picture::distributions::Distributions;
@@ -12,7 +12,7 @@ use crate::picture::values::{BeyondSpec, ModeName, Theme};
 use serde::Serialize;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
-use wavesplat_core::colour::{Clear, Distribution, Norm, Rgb, Scale, TransferFunction};
+use wavesplat_core::colour::{Clear, Distribution, Norm, Opacities, Rgb, Scale, TransferFunction};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::render::sink::PictureFormat;
 use wavesplat_engine::render::{Mode, Pixel, Quantity, RenderConfig, Scene};
@@ -58,10 +58,7 @@ pub(in crate::picture) struct ColouringInput<'a> {
     pub(in crate::picture) errors: Option<&'a Targets>,
     /// The colours of samples.
     pub(in crate::picture) colours: Option<&'a TransferFunction>,
-    /// Whether the volume is of a body: greys are usual.
-    pub(in crate::picture) is_of_body: bool,
-    /// The least sample of the source, if it is known.
-    pub(in crate::picture) least: Option<f64>,
+    pub(in crate::picture) known: KnownSamples,
 }
 
 impl ColouringInput<'_> {
@@ -80,28 +77,23 @@ impl ColouringInput<'_> {
         let beyond = if in_colours { self.beyond(pixel) } else { BeyondSpec::Nothing };
         let finds = fixed.is_none() || is_clear || beyond == BeyondSpec::Auto;
         let needed = Needed { pictures: in_colours && finds, beyond, errors: errors_in_colours };
-        let mut ranges = ranges(needed)?;
-        ranges.is_of_tissue = self.is_of_body;
+        let ranges = ranges(needed)?;
         let beyond = match beyond {
             BeyondSpec::Value(value) => Some(value),
             BeyondSpec::Auto | BeyondSpec::Nothing => ranges.beyond,
         };
         let sample_colours = self.colours.filter(|_| pixel != Pixel::Value);
-        let map =
-            sample_colours.map_or_else(|| value_colours(request, self.is_of_body), |colours| Ok(colours.clone()))?;
+        let map = sample_colours.map_or_else(|| value_colours(request, self.known), |colours| Ok(colours.clone()))?;
         let (range, norm) = match pixel {
-            Pixel::Value => value_spread(request, &map, &ranges, self.least, in_colours, reporter)?,
+            Pixel::Value => value_spread(request, self.known, &map, &ranges, in_colours, reporter)?,
             _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
         };
         if (in_colours && fixed.is_none()) || errors_in_colours {
-            reporter.detail(format_args!("colours from {:.4e} to {:.4e}; `range` sets them", range.0, range.1));
-        }
-        if errors_in_colours {
-            reporter.detail(format_args!("colours of errors from 0 to {:.4e}", ranges.errors.1));
+            report_ranges(range, errors_in_colours.then_some(ranges.errors.1), reporter);
         }
         if let Some(beyond) = beyond {
             reporter.detail(format_args!(
-                "short rays are taken for as long as the longest, with {beyond:.4e} beyond the volume; `beyond` none shows plain means"
+                "short rays are filled up with the value {beyond:.4e}; `beyond` none shows plain means"
             ));
         }
         let scale = |range, norm| Scale::new(&map, range, norm, background(request));
@@ -165,6 +157,14 @@ fn background(request: &PictureRequest) -> Rgb {
     request.background.map_or(theme_colour, |colour| colour.0)
 }
 
+/// Says what the first and the last colour stand for, and the largest error in colours, if there are errors.
+fn report_ranges((lo, hi): (f64, f64), error: Option<f64>, reporter: &dyn Reporter) {
+    reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
+    if let Some(error) = error {
+        reporter.detail(format_args!("colours of errors from 0 to {error:.4e}"));
+    }
+}
+
 /// The colours of a composite or of surfaces. A range that is not given ends at the largest value of small pictures.
 /// Opacities that are not given are suggested from an overview of the samples.
 pub(in crate::picture) fn automatic_colours(
@@ -183,7 +183,7 @@ pub(in crate::picture) fn automatic_colours(
     if modes::has_automatic_range(request)? {
         let needed = Needed { pictures: true, beyond: BeyondSpec::Nothing, errors: false };
         let ranges = Ranges::small(scene, config, needed, reporter)?;
-        colours = ranges.stretch(&colours)?;
+        colours = with_given_values(request, ranges.stretch(&colours)?)?;
         overview = ranges.into_overview();
         let (lo, hi) = colours.range();
         reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
@@ -195,6 +195,14 @@ pub(in crate::picture) fn automatic_colours(
     let planes = planes_of(&config.mode);
     config.mode = with_planes(modes::mode(request, Some(&colours))?, planes);
     Ok(Some(colours))
+}
+
+/// Colours whose range has all values at which opacities are given.
+fn with_given_values(request: &PictureRequest, colours: TransferFunction) -> Result<TransferFunction> {
+    let Some(Opacities::Points(points)) = &request.opacity else { return Ok(colours) };
+    let around = |range: (f64, f64), value: f64| (range.0.min(value), range.1.max(value));
+    let range = points.values().fold(colours.range(), around);
+    if range == colours.range() { Ok(colours) } else { colours.over(range) }
 }
 
 /// Says which surfaces no sample of the file reaches, and which have all samples on the source's sides.

@@ -29,7 +29,7 @@ use modes::check_slices;
 use opened::Opened;
 use planes::{set_planes, slice_texts};
 use provenance::provenance;
-use ranges::Ranges;
+use ranges::{KnownSamples, Ranges};
 use sinks::SinkInput;
 use std::sync::Arc;
 use targets::AllTargets;
@@ -73,8 +73,10 @@ impl Plan {
             pictures: &targets.pictures,
             errors: targets.errors.as_ref(),
             colours: colours.as_ref(),
-            is_of_body: axes.is_of_body(),
-            least: file.as_ref().map(|file| file.source_range().0).filter(|least| least.is_finite()),
+            known: KnownSamples {
+                least: file.as_ref().map(|file| file.source_range().0).filter(|least| least.is_finite()),
+                are_of_body: axes.labels().iter().any(|axis| axis.sides.is_some()),
+            },
         };
         let colouring = input.colouring(|needed| Ranges::small(scene.as_mut(), &config, needed, reporter), reporter)?;
         let provenance = Provenance {

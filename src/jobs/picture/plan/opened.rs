@@ -4,7 +4,7 @@ use super::annotations::annotation;
 use super::config::frames_of;
 use super::modes;
 use super::named_colours::colours_of_source;
-use super::views::{face_on, has_own_view, views};
+use super::views::{across_and_up, are_panels, face_on, is_placed, views};
 use crate::axes::Axes;
 use crate::picture::distributions::Distributions;
 use crate::picture::reporter::Reporter;
@@ -117,7 +117,7 @@ fn exaggeration(request: &PictureRequest, axes: &Axes, grid: &Grid, reporter: &d
         return Ok(factor);
     }
     if let Some(factor) = height_of_section(request, axes, grid)? {
-        let (height, across) = (axes.name(2), axes.name(section_across(request, axes)?));
+        let (height, across) = (axes.name(2), axes.name(section_across(request, axes, grid)?));
         reporter.note(format_args!(
             "the section is drawn 0.6 times as high as wide, since {height} does not compare with {across}; `exaggerate` sets another height"
         ));
@@ -136,12 +136,11 @@ fn exaggeration(request: &PictureRequest, axes: &Axes, grid: &Grid, reporter: &d
 fn height_of_section(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<Option<f64>> {
     /// The height as a share of the width.
     const SHAPE: f64 = 0.6;
-    let is_placed = request.scale.is_some() || request.center.is_some();
-    let are_panels = request.slice.len() == 3 && !has_own_view(request);
-    if is_placed || grid.dims[2] == 1 || !are_panels && face_on(request, axes, grid)?.is_none() {
+    let is_seen = are_panels(request, axes)? || face_on(request, axes, grid)?.is_some();
+    if is_placed(request) || grid.dims[2] == 1 || !is_seen {
         return Ok(None);
     }
-    let across = section_across(request, axes)?;
+    let across = section_across(request, axes, grid)?;
     let extent = |axis: usize| grid.dims[axis] as f64 * grid.spacing[axis];
     let factor = SHAPE * extent(across) / extent(2);
     let factor = format!("{factor:.2e}").parse().unwrap_or(factor); // three digits
@@ -149,13 +148,13 @@ fn height_of_section(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Resu
 }
 
 /// The axis to the right in a section seen face-on; 2 if it has no heights.
-fn section_across(request: &PictureRequest, axes: &Axes) -> Result<usize> {
-    let cut = request.slice.first().map(|slice| axes.find("slice", &slice.axis)).transpose()?;
-    Ok(match cut.filter(|_| request.slice.len() == 1) {
-        None => 0, // the widest of several
-        Some(0) => 1,
-        Some(1) => 0,
-        _ => 2,
+fn section_across(request: &PictureRequest, axes: &Axes, grid: &Grid) -> Result<usize> {
+    let extent = |axis: usize| grid.dims[axis] as f64 * grid.spacing[axis];
+    let longest = usize::from(extent(1) > extent(0));
+    let [only] = request.slice.as_slice() else { return Ok(longest) };
+    Ok(match axes.find("slice", &only.axis)? {
+        2 => 2,
+        cut => across_and_up(cut)[0],
     })
 }
 

@@ -15,15 +15,16 @@ const MOST_READ: usize = 8;
 /// The largest number of samples to look at.
 const MOST_SAMPLES: usize = 1 << 20;
 
-/// The frame in the middle, or one where an overview shows much more.
+/// The one in the middle of some frames, or one where an overview shows much more.
 pub(in crate::picture) fn opening_frame(
     scene: &mut dyn Scene,
     file: Option<&CoefficientFile>,
+    all: &[usize],
     memory: usize,
     progress: &dyn Progress,
 ) -> Result<usize> {
-    let middle = scene.frames().unwrap_or(0) / 2;
-    let frames = frames_to_see(file, middle);
+    let Some(&middle) = all.get(all.len() / 2) else { return Ok(0) };
+    let frames = frames_to_see(file, all, middle);
     let (thinning, region) = (thinning(scene, frames.len()), scene.grid().whole());
     let request = OverviewRequest { thinning, frames: &frames, memory, region };
     let samples = match scene.overview(&request, progress) {
@@ -37,12 +38,16 @@ pub(in crate::picture) fn opening_frame(
     Ok(frames[opening(&spreads, preferred)])
 }
 
-/// The frame in the middle, and those of the window whose samples differ most; without windows, some of all frames. In ascending
+/// The frame in the middle, and those in the window whose samples differ most; without windows, some of all frames. In ascending
 /// order.
-fn frames_to_see(file: Option<&CoefficientFile>, middle: usize) -> Vec<usize> {
-    let mut frames = match file.and_then(widest_window) {
-        Some(window) => spread_over(window.len(), MOST_FRAMES).into_iter().map(|n| window.start + n).collect(),
-        None => spread_over(2 * middle, MOST_READ),
+fn frames_to_see(file: Option<&CoefficientFile>, all: &[usize], middle: usize) -> Vec<usize> {
+    let some = |frames: &[usize], most| spread_over(frames.len(), most).into_iter().map(|n| frames[n]).collect();
+    let mut frames: Vec<usize> = match file.and_then(widest_window) {
+        Some(window) => {
+            let within: Vec<usize> = all.iter().copied().filter(|frame| window.contains(frame)).collect();
+            if within.is_empty() { vec![middle] } else { some(&within, MOST_FRAMES) }
+        }
+        None => some(all, MOST_READ),
     };
     frames.push(middle);
     frames.sort_unstable();

@@ -1,21 +1,21 @@
 //! Three slices side by side, each face-on in its own part of the picture.
 
 use super::annotations::picture_margins;
-use super::views::{across_and_up, has_own_view, view_across};
+use super::views::{across_and_up, are_panels, view_across};
 use crate::axes::Axes;
 use crate::picture::request::PictureRequest;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::Grid;
 use wavesplat_core::view::camera::{Camera, View};
 use wavesplat_engine::render::Plane;
-use wavesplat_engine::render::annotate::Margins;
+use wavesplat_engine::render::annotate::{Margins, line};
 
 /// The room of an axis in each column and row, by the number of the axis that a panel cuts: side by side, in two rows, or one below
 /// the other.
 const ARRANGEMENTS: [&[&[usize]]; 3] = [&[&[1, 0, 2]], &[&[1, 0], &[2]], &[&[1], &[0], &[2]]];
 
-/// Gaps between panels, as a share of the picture's shorter side: a line of letters with room around.
-const GAP: f64 = 0.045;
+/// Gaps between panels, in lines of letters: one line with room around.
+const GAP: f64 = 1.6;
 
 /// The views of three slices across three axes, one for each; none for other slices, or if a view or a scale is given.
 pub(in crate::picture) fn panels(
@@ -24,14 +24,13 @@ pub(in crate::picture) fn panels(
     grid: &Grid,
     planes: &[Plane],
 ) -> Result<Vec<View>> {
-    let cuts: Vec<usize> = planes.iter().map(|plane| plane.axis).collect();
-    let is_orthogonal = cuts.len() == 3 && (0..3).all(|axis| cuts.contains(&axis));
-    if !is_orthogonal || has_own_view(request) {
+    if !are_panels(request, axes)? {
         return Ok(Vec::new());
     }
     let layouts = ARRANGEMENTS.map(|cuts| Layout::new(request, grid, cuts));
     let best = layouts.into_iter().max_by(|a, b| a.scale.total_cmp(&b.scale));
-    best.map_or(Ok(Vec::new()), |layout| cuts.iter().map(|cut| layout.view(request, axes, grid, *cut)).collect())
+    let view = |layout: &Layout<'_>, plane: &Plane| layout.view(request, axes, grid, plane.axis);
+    best.map_or(Ok(Vec::new()), |layout| planes.iter().map(|plane| view(&layout, plane)).collect())
 }
 
 /// Where panels lie.
@@ -61,7 +60,7 @@ impl<'a> Layout<'a> {
             |column: usize| cuts.iter().filter_map(|row| row.get(column)).map(|cut| side(cut, 0)).fold(0.0, f64::max);
         let columns: Vec<f64> = (0..cuts[0].len()).map(widest).collect();
         let rows: Vec<f64> = cuts.iter().map(|row| row.iter().map(|cut| side(cut, 1)).fold(0.0, f64::max)).collect();
-        let (gap, margins) = (GAP * width.min(height), [left as f64, bottom as f64]);
+        let (gap, margins) = (GAP * line(request.size.0), [left as f64, bottom as f64]);
         let room = [width - right as f64, height - top as f64];
         let taken = |i: usize, count: usize| count as f64 * margins[i] + (count + 1) as f64 * gap;
         let fit = |i: usize, sides: &[f64]| (room[i] - taken(i, sides.len())) / sides.iter().sum::<f64>();

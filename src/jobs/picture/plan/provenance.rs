@@ -30,7 +30,7 @@ pub(in crate::picture) fn provenance(
         quantity: (mode == ModeName::Projection).then_some(request.quantity.name()),
         size: request.size.0,
         tau: config.kernel.tau,
-        sigma: config.kernel.sigma,
+        sigma: sigma(config, grid),
         splat_error: config.splat_error,
         tolerance: request.tolerance,
         error: request.tolerance.map(|_| request.error.name()),
@@ -53,6 +53,13 @@ pub(in crate::picture) fn provenance(
         Some(_) => in_colours(provenance, colouring, &colouring.picture_scale),
         None => provenance,
     }
+}
+
+/// The kernel's standard deviation in world units; `None` if it differs from axis to axis.
+fn sigma(config: &RenderConfig, grid: &Grid) -> Option<f64> {
+    let [x, y, z] = grid.spacing;
+    let differs = config.kernel.follows_axes && config.mode != Mode::Projection && (x != y || y != z);
+    (!differs).then_some(config.kernel.sigma)
 }
 
 /// Adds what is known about the coefficient file.
@@ -130,7 +137,6 @@ pub(in crate::picture) fn error_provenance(provenance: &Provenance, colouring: &
         norm: None,
         background: None,
         clear: None,
-        beyond: None,
         ..provenance.clone()
     };
     match colouring.coloured().error_range {

@@ -135,15 +135,19 @@ fn robust_range(values: &[f32]) -> (f64, f64) {
     (clipped(lo, low), clipped(hi, high))
 }
 
-/// The end of a range for tissue: few of the ascending values that are not near those of air are brighter. `None` if there are too few.
+/// The end of a range for tissue: few of the ascending values that are not near those of air are brighter. `None` if hardly any is of
+/// air, as in maps of signed values.
 fn tissue_end(values: &[f32]) -> Option<f64> {
-    /// The share of values that are not brighter, and that of its distance from the least value up to which it is air.
+    /// The share of values that are not brighter.
     const MOST: f64 = 0.98;
+    /// How far air reaches from the least values, as a share of the range, and its least share of all values.
     const AIR: f64 = 0.1;
+    const LEAST_AIR: f64 = 0.1;
     let at = |values: &[f32], share: f64| values.get((share * values.len() as f64) as usize).map(|v| f64::from(*v));
     let (least, most) = (at(values, 0.01)?, at(values, MOST)?);
     let air = values.partition_point(|value| f64::from(*value) <= least + AIR * (most - least));
-    at(&values[air..], MOST).filter(|end| *end > least)
+    let has_air = air as f64 >= LEAST_AIR * values.len() as f64;
+    at(&values[air..], MOST).filter(|end| has_air && *end > least)
 }
 
 /// The settings of small pictures.
@@ -264,7 +268,7 @@ fn thinning(scene: &dyn Scene, small: &RenderConfig) -> Result<Thinning> {
 fn overview_config(request: &OverviewRequest<'_>, grid: &Grid, small: &RenderConfig, bytes: usize) -> RenderConfig {
     let sigma = small.kernel.sigma.max(SIGMA * grid.largest_spacing());
     RenderConfig {
-        kernel: Kernel { sigma, follows_axes: false, ..small.kernel },
+        kernel: Kernel { sigma, ..small.kernel },
         frames: (0..request.frames.len()).collect(),
         region: small.region.map(|region| request.thinning.region(&region)),
         allowed: None,
@@ -329,6 +333,15 @@ pub(in crate::picture) fn rays(config: &RenderConfig, grid: &Grid) -> RayLengths
     RayLengths::new(grid, &config.region.unwrap_or(grid.whole()), rim(&config.kernel, grid))
 }
 
+/// What is known of the samples without looking at them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::picture) struct KnownSamples {
+    /// The least one.
+    pub(in crate::picture) least: Option<f64>,
+    /// Whether they are of a body, where greys and the range of tissue are usual.
+    pub(in crate::picture) are_of_body: bool,
+}
+
 /// Which ranges are needed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::picture) struct Needed {
@@ -346,8 +359,6 @@ pub(in crate::picture) struct Ranges {
     pub(in crate::picture) errors: (f64, f64),
     /// The value beyond the volume, if means are weighed with it.
     pub(in crate::picture) beyond: Option<f64>,
-    /// Whether most values are tissue, whose range is wanted, and not that of a few bright spots.
-    pub(in crate::picture) is_of_tissue: bool,
     /// The values of small pictures, as they are shown.
     all: Distribution,
     /// The overview that they show, if there is one.
@@ -361,7 +372,6 @@ impl Default for Ranges {
             positive: Some(1.0),
             errors: (0.0, 1.0),
             beyond: None,
-            is_of_tissue: false,
             all: Distribution::default(),
             overview: None,
         }
@@ -478,16 +488,16 @@ impl Ranges {
         (0.0, self.values.1)
     }
 
-    /// The default range of colours. `least` is the least sample, if it is known.
+    /// The default range of colours.
     pub(in crate::picture) fn automatic(
         &self,
         norm: Norm,
         map: &TransferFunction,
-        least: Option<f64>,
+        known: KnownSamples,
     ) -> Result<(f64, f64)> {
         const DECADES: f64 = 1e-4;
         let (lo, mut hi) = self.values;
-        if self.is_of_tissue {
+        if known.are_of_body {
             hi = tissue_end(self.all.values()).unwrap_or(hi);
         }
         if norm == Norm::Log {
@@ -495,7 +505,7 @@ impl Ranges {
                 self.positive.ok_or_else(|| Error::value("norm", "log", "no value is above 0; give `norm` linear"))?;
             return Ok((least.max(hi * DECADES), hi));
         }
-        Ok(if lo < hi { map.suitable(at_least_noticeable(not_below_zero((lo, hi), least))) } else { (lo, hi) })
+        Ok(if lo < hi { map.suitable(at_least_noticeable(not_below_zero((lo, hi), known.least))) } else { (lo, hi) })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The colours of values: map, range, norm, and which values show the background.
 
 use super::named_colours::open_colours;
-use super::ranges::Ranges;
+use super::ranges::{KnownSamples, Ranges};
 use crate::picture::reporter::Reporter;
 use crate::picture::request::PictureRequest;
 use crate::picture::values::ClearSpec;
@@ -50,18 +50,18 @@ pub(in crate::picture) fn refuse_for_colours(request: &PictureRequest) -> Result
 }
 
 /// The colours of values, over the range if one was given. Those of bodies are greys unless others are given.
-pub(in crate::picture) fn value_colours(request: &PictureRequest, is_of_body: bool) -> Result<TransferFunction> {
-    let usual = if is_of_body { "grey" } else { "viridis" };
+pub(in crate::picture) fn value_colours(request: &PictureRequest, known: KnownSamples) -> Result<TransferFunction> {
+    let usual = if known.are_of_body { "grey" } else { "viridis" };
     let map = open_colours("colormap", request.colormap.as_deref().unwrap_or(usual))?;
     request.range.map_or(Ok(map.clone()), |range| map.over(range.0.into()))
 }
 
-/// The values of the first and the last colour, and the norm between them. `least` is the least sample, if it is known.
+/// The values of the first and the last colour, and the norm between them.
 pub(in crate::picture) fn value_spread(
     request: &PictureRequest,
+    known: KnownSamples,
     map: &TransferFunction,
     ranges: &Ranges,
-    least: Option<f64>,
     in_colours: bool,
     reporter: &dyn Reporter,
 ) -> Result<((f64, f64), Norm)> {
@@ -70,7 +70,7 @@ pub(in crate::picture) fn value_spread(
     }
     let norm = request.norm;
     if !map.is_of_values() {
-        return Ok((ranges.automatic(norm, map, least)?, norm));
+        return Ok((ranges.automatic(norm, map, known)?, norm));
     }
     let ((lo, hi), (least, most)) = (map.range(), ranges.values);
     if request.range.is_none() && (most < lo || hi < least) {

@@ -86,9 +86,21 @@ pub(in crate::picture) fn face_on(request: &PictureRequest, axes: &Axes, grid: &
 }
 
 /// Whether the view of slices is given, or they are drawn within something.
-pub(in crate::picture) fn has_own_view(request: &PictureRequest) -> bool {
+fn has_own_view(request: &PictureRequest) -> bool {
     let is_usual = request.view.is_empty() && request.orbit == 1 && !is_moving(request);
     !is_usual || mode_name(request) != ModeName::Slice
+}
+
+/// Whether a part of the view is given, so that slices do not fill the picture.
+pub(in crate::picture) fn is_placed(request: &PictureRequest) -> bool {
+    request.scale.is_some() || request.center.is_some() || request.roll != 0.0
+}
+
+/// Whether slices stand side by side: three across all axes, without a view of their own.
+pub(in crate::picture) fn are_panels(request: &PictureRequest, axes: &Axes) -> Result<bool> {
+    let cuts = request.slice.iter().map(|slice| axes.find("slice", &slice.axis)).collect::<Result<Vec<usize>>>()?;
+    let are_orthogonal = cuts.len() == 3 && (0..3).all(|axis| cuts.contains(&axis));
+    Ok(are_orthogonal && !has_own_view(request) && !is_placed(request))
 }
 
 /// The axes to the right and up in a slice across an axis: x to the right if possible, else y; z up if possible, else y.
@@ -121,7 +133,7 @@ pub(in crate::picture) fn view_across(request: &PictureRequest, axes: &Axes, cut
 /// A slice across an axis, face-on. It fills the picture, beside the annotation.
 fn filling(request: &PictureRequest, axes: &Axes, cut: usize, grid: &Grid) -> Result<View> {
     let (size, view) = (request.size.0, view_across(request, axes, cut));
-    if request.scale.is_some() || request.center.is_some() || request.roll != 0.0 {
+    if is_placed(request) {
         return Ok(view);
     }
     let around @ Margins { left, right, top, bottom } = picture_margins(request);

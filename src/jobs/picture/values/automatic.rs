@@ -113,7 +113,7 @@ impl FromStr for BeyondSpec {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let value = || text.parse().ok().filter(|value: &f64| value.is_finite());
+        let value = || text.parse().ok().filter(|value: &f64| (*value as f32).is_finite());
         match text {
             "auto" => Ok(Self::Auto),
             "none" => Ok(Self::Nothing),

@@ -94,9 +94,24 @@ function paintChannels(planes, scale, background, pixels) {
   }
 }
 
-// Values as if all rays were equally long (eq 51). The shares of the longest ray are RGBA bytes with a high and a low byte.
+// The lengths of the rays of all pixels, as shares of the longest one, as src/engine/render/ray_lengths.rs has them.
+function sharesOf({ from, right, down, along, ends, longest }, [width, height]) {
+  return Float32Array.from({ length: width * height }, (_, at) => {
+    const x = at % width, y = Math.floor(at / width);
+    let near = -Infinity, far = Infinity;
+    for (let a = 0; a < 3; a++) {
+      const start = from[a] + x * right[a] + y * down[a], [low, high] = ends[a];
+      if (along[a] === 0 && !(low <= start && start <= high)) return 0;
+      if (along[a] === 0) continue;
+      const one = (low - start) / along[a], other = (high - start) / along[a];
+      near = Math.max(near, Math.min(one, other));
+      far = Math.min(far, Math.max(one, other));
+    }
+    return Math.min(Math.max(far - near, 0) / longest, 1);
+  });
+}
+
+// Values as if all rays were equally long (eq 51).
 function weighed(values, shares, beyond) {
-  if (!shares) return values;
-  const share = i => (256 * shares[4 * i] + shares[4 * i + 1]) / 65535;
-  return values.map((value, i) => beyond + share(i) * (value - beyond));
+  return shares ? values.map((value, i) => beyond + shares[i] * (value - beyond)) : values;
 }

@@ -86,7 +86,7 @@ class Live {
   key(isFull) {
     const isChosen = this.look.mode === 'composite' && this.look.range;
     const { look, certify } = this.request(null, isFull);
-    return JSON.stringify({ ...look, ...(isChosen ? {} : { range: null }), clear: null, certify, colours: this.colourKey(isFull) });
+    return JSON.stringify({ ...look, ...(isChosen ? {} : { range: null }), clear: null, beyond: null, certify, colours: this.colourKey(isFull) });
   }
 
   // A picture: complete if nothing moves, else a small one.
@@ -165,9 +165,9 @@ class Live {
     Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, hasBar: mode === 'composite', opacity });
     about.mode = mode === 'error' && !errors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
-    if (!isChosen) this.known[colours] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null, beyond: about.shares[0] ? about.beyond : null };
-    const kept = this.remembered(key), still = address => address ? pixelsOf(address, about.size) : null;
-    const [backdrop, shares] = await Promise.all([about.backdrops[0], about.shares[0]].map(still));
+    if (!isChosen) this.known[colours] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null, beyond: about.rays[0] ? about.beyond : null };
+    const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;
+    const shares = about.rays[0] && sharesOf(about.rays[0], about.size);
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
       const { pictures } = await readBlock(bytes.subarray(at, at += size));

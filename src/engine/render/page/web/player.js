@@ -227,7 +227,7 @@ class Player {
   draw() {
     const { planes, backdrop, shares, about } = this.shown ?? {};
     if (!planes || planes[0].length * 4 !== this.image.data.length) return;
-    const painted = about.kind === 'value' ? [weighed(planes[0], shares, about.beyond)] : planes;
+    const painted = about.kind === 'value' && !this.scale.log ? [weighed(planes[0], shares, about.beyond)] : planes;
     paint(painted, about.kind, this.scale, backdrop ?? this.plainBackground(planes[0].length), this.image.data);
     this.context.putImageData(this.image, 0, 0);
     document.documentElement.dataset.drawn = `${this.sequence}:${this.index}`;

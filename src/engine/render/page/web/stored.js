@@ -18,7 +18,7 @@ class Stored {
       script, sequence: Number(script.dataset.sequence), first: Number(script.dataset.first), count: Number(script.dataset.count),
     }));
     this.unpacked = new Map(); // the block that was used last is at the end
-    this.stills = new Map();
+    this.backdrops = new Map();
   }
 
   async picture(sequence, index) {
@@ -26,9 +26,8 @@ class Stored {
     const block = this.blocks.find(holds);
     if (!block) throw new Error(`this page lacks picture ${index}`);
     const { view } = this.sequences[sequence].pictures[index];
-    const stills = [this.about.backdrops, this.about.shares].map(all => this.still(all[view]));
-    const [{ pictures }, backdrop, shares] = await Promise.all([this.unpack(block), ...stills]);
-    return { planes: pictures[index - block.first], about: this.about, backdrop, shares };
+    const [{ pictures }, backdrop] = await Promise.all([this.unpack(block), this.backdrop(view)]);
+    return { planes: pictures[index - block.first], about: this.about, backdrop, shares: this.shares(view) };
   }
 
   whole(sequence, index) { return this.picture(sequence, index); }
@@ -45,11 +44,19 @@ class Stored {
     return found;
   }
 
-  // The bytes of what is the same for all pictures of a view: its backdrop, which lies behind them, or the lengths of its rays.
-  still(address) {
+  // The backdrop of a view, which lies behind its pictures.
+  backdrop(view) {
+    const address = this.about.backdrops[view];
     if (!address) return null;
-    if (!this.stills.has(address)) this.stills.set(address, pixelsOf(address, this.about.size));
-    return this.stills.get(address);
+    if (!this.backdrops.has(view)) this.backdrops.set(view, pixelsOf(address, this.about.size));
+    return this.backdrops.get(view);
+  }
+
+  // The lengths of the rays of the view that was shown last.
+  shares(view) {
+    const { rays, size } = this.about;
+    if (this.ofView?.view !== view) this.ofView = { view, shares: rays[view] && sharesOf(rays[view], size) };
+    return this.ofView.shares;
   }
 }
 

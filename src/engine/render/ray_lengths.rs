@@ -1,17 +1,18 @@
-//! Means as if all rays of a view were equally long. The mean along a ray that barely touches the volume is that of few voxels: it
-//! stands out at the rim, and says little.
+//! The lengths of rays, by which means are weighed: a ray that barely touches the volume meets few voxels, so that its mean stands
+//! out at the rim, and says little. Short rays are filled up with the value `beyond` (eq 51):
 //!
 //! ```text
-//! shown = beyond + share (mean - beyond)        share = length of the ray / longest length in the view     (eq 51)
+//! shown = beyond + share (mean - beyond)        share = length of the ray / longest length in the view
 //! ```
-//!
-//! This is the mean along a ray of the longest length that meets the value `beyond` outside of the volume.
 
-use super::PIXELS;
-use crate::render::ViewReport;
-use crate::render::annotate::camera;
+use super::ViewReport;
+use super::annotate::camera;
 use rayon::prelude::*;
+use serde::Serialize;
 use wavesplat_core::base::grid::{Grid, Region};
+
+/// The least number of pixels whose rays a thread measures.
+const PIXELS: usize = 1 << 14;
 
 /// The box of a volume in which rays are measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,29 +31,56 @@ impl RayLengths {
         Self { grid: *grid, ends: [0, 1, 2].map(|axis| [least(axis), largest(axis)]) }
     }
 
-    /// The lengths of the rays of all pixels, row by row, as shares of the longest one in the view; none if the view is none.
-    pub fn shares(&self, view: &ViewReport, size @ [width, height]: [usize; 2]) -> Vec<f32> {
-        let Some(camera) = camera(&self.grid, size, view) else { return Vec::new() };
-        let (_, along) = camera.ray([0.0; 2]);
-        let longest =
-            (0..3).map(|a| (self.ends[a][1] - self.ends[a][0]) / along[a].abs()).fold(f64::INFINITY, f64::min);
-        let share = |at: usize| {
-            let (from, along) = camera.ray([(at % width) as f64 + 0.5, (at / width) as f64 + 0.5]);
-            (self.length(from, along) / longest).min(1.0) as f32
-        };
-        (0..width * height).into_par_iter().with_min_len(PIXELS).map(share).collect()
+    /// The rays of a picture; `None` if its view is none.
+    pub(super) fn seen(&self, view: &ViewReport, size: [usize; 2]) -> Option<SeenRays> {
+        let camera = camera(&self.grid, size, view)?;
+        let from = |pixel: [f64; 2]| camera.ray(pixel).0;
+        let [first, right, down] = [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]].map(from);
+        let (ends, along) = (self.ends, camera.ray([0.0; 2]).1);
+        let longest = (0..3).map(|a| (ends[a][1] - ends[a][0]) / along[a].abs()).fold(f64::INFINITY, f64::min);
+        let step = |to: [f64; 3]| std::array::from_fn(|a| to[a] - first[a]);
+        Some(SeenRays { from: first, right: step(right), down: step(down), along, ends, longest })
     }
 
-    /// The length of a ray within the box; `along` has length 1.
-    fn length(&self, from: [f64; 3], along: [f64; 3]) -> f64 {
+    /// The lengths of the rays of all pixels, row by row, as shares of the longest one in the view; none if the view is none.
+    pub fn shares(&self, view: &ViewReport, size @ [width, height]: [usize; 2]) -> Vec<f32> {
+        let Some(rays) = self.seen(view, size) else { return Vec::new() };
+        let share = |at: usize| rays.share([at % width, at / width]);
+        (0..width * height).into_par_iter().with_min_len(PIXELS).map(share).collect()
+    }
+}
+
+/// The rays of a picture through a box, as a page gets them.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct SeenRays {
+    /// The origin of the first pixel's ray, and its change from column to column and from row to row.
+    from: [f64; 3],
+    right: [f64; 3],
+    down: [f64; 3],
+    /// The direction of all rays, of length 1.
+    along: [f64; 3],
+    ends: [[f64; 2]; 3],
+    /// The longest length within the box.
+    longest: f64,
+}
+
+impl SeenRays {
+    /// The length of a pixel's ray as a share of the longest one.
+    fn share(&self, [x, y]: [usize; 2]) -> f32 {
+        let from = std::array::from_fn(|a| self.from[a] + x as f64 * self.right[a] + y as f64 * self.down[a]);
+        (self.length(from) / self.longest).min(1.0) as f32
+    }
+
+    /// The length of a ray within the box.
+    fn length(&self, from: [f64; 3]) -> f64 {
         let [mut near, mut far] = [f64::NEG_INFINITY, f64::INFINITY];
         for (axis, ends) in self.ends.iter().enumerate() {
-            let is_across = along[axis] == 0.0;
-            if is_across && !(ends[0]..=ends[1]).contains(&from[axis]) {
+            let along = self.along[axis];
+            if along == 0.0 && !(ends[0]..=ends[1]).contains(&from[axis]) {
                 return 0.0;
             }
-            if !is_across {
-                let [a, b] = ends.map(|end| (end - from[axis]) / along[axis]);
+            if along != 0.0 {
+                let [a, b] = ends.map(|end| (end - from[axis]) / along);
                 (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
             }
         }
@@ -67,13 +95,6 @@ pub struct Weighing {
     pub rays: RayLengths,
     /// The value beyond the volume.
     pub beyond: f32,
-}
-
-impl Weighing {
-    /// The value to show for a mean along a ray with this share of the longest length (eq 51).
-    pub(super) fn value(&self, mean: f32, share: f32) -> f32 {
-        weighed(mean, share, self.beyond)
-    }
 }
 
 /// The value to show for a mean, with a value beyond the volume (eq 51).
@@ -110,11 +131,13 @@ mod tests {
         let rays = plate();
         assert_eq!(rays.ends, [[5.25, 17.0 - 0.25], [-4.0, 10.0], [2.5, 5.0]]);
         for angles in [[0.0, 0.0], [90.0, 0.0], [0.0, 90.0], [31.0, 17.0], [210.0, -40.0]] {
-            let camera = camera(&rays.grid, SIZE, &view(angles[0], angles[1])).expect("a view");
-            for pixel in [[20.5, 15.5], [3.0, 4.0], [31.0, 20.0], [12.0, 12.0]] {
-                let (from, along) = camera.ray(pixel);
-                let (length, expected) = (rays.length(from, along), stepped(&rays, from, along));
-                assert!((length - expected).abs() < 3e-3, "{angles:?} {pixel:?}: {length} {expected}");
+            let view = view(angles[0], angles[1]);
+            let (seen, camera) = (rays.seen(&view, SIZE), camera(&rays.grid, SIZE, &view));
+            let (seen, camera) = (seen.expect("rays"), camera.expect("a view"));
+            for [x, y] in [[20, 15], [3, 4], [31, 20], [12, 12]] {
+                let (from, along) = camera.ray([x as f64 + 0.5, y as f64 + 0.5]);
+                let (length, expected) = (f64::from(seen.share([x, y])) * seen.longest, stepped(&rays, from, along));
+                assert!((length - expected).abs() < 3e-3, "{angles:?} {x} {y}: {length} {expected}");
             }
         }
     }
