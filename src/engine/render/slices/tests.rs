@@ -389,14 +389,14 @@ fn the_default_kernel_follows_the_axes() {
     }
 }
 
-/// Where the kernel is only half within the volume, the largest depends on where exactly the volume ends.
+/// At the rim, the largest depends on where exactly the volume ends.
 #[test]
 fn the_largest_value_is_that_of_brute_force() {
     for view in views() {
         let mut case = case([18, 15, 13], view);
         case.values.iter_mut().for_each(|value| *value -= 0.8);
         let found = case.picture(Mode::Mip { slices: None });
-        let [low, expected, high] = [0.25, 0.0, -0.25].map(|beyond| case.largest(beyond));
+        let [low, expected, high] = [0.3, 0.0, -0.5].map(|beyond| case.largest(beyond)); // the rim is of few cells
         let is_sure = |n: &usize| (high[*n] - low[*n]).abs() < 1e-3;
         let off: Vec<f64> =
             (0..found.len()).filter(is_sure).map(|n| (f64::from(found[n]) - expected[n]).abs()).collect();
