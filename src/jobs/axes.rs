@@ -144,48 +144,80 @@ impl Axis {
         }
     }
 
-    /// The voxels between the ends of a box: with coordinates, those from the one to the other.
-    fn range(&self, ends: &Ends) -> std::result::Result<Range<usize>, String> {
-        let Ends { from, to } = ends;
-        if let (Some(AxisPosition::Coordinate(a, of_a)), Some(AxisPosition::Coordinate(b, of_b))) = (from, to) {
-            self.check_unit(of_a).and_then(|()| self.check_unit(of_b))?;
-            let [first, last] = [self.place_or_beyond(*a)?, self.place_or_beyond(*b)?];
-            let is_turned = first > last && (a < b) == (self.at[0] < self.at[self.at.len() - 1]);
-            if is_turned {
-                return Err(format!(
-                    "{a} to {b} crosses the ends of the axis {}: take its two sides one by one",
-                    self.names[0]
-                ));
-            }
-            return Ok(whole_from(first.min(last))..whole_up_to(first.max(last)));
+    /// The voxels between the ends of a box.
+    fn range(&self, Ends { from, to }: &Ends) -> std::result::Result<Range<usize>, String> {
+        let is_coordinate = |end: &Option<AxisPosition>| matches!(end, Some(AxisPosition::Coordinate(..)));
+        if !is_coordinate(from) && !is_coordinate(to) {
+            let end = |end: &Option<AxisPosition>, open| end.as_ref().map_or(Ok(open), |place| self.end(place));
+            return Ok(end(from, 0)?..end(to, self.at.len())?);
         }
-        let first = from.as_ref().map_or(Ok(0), |from| self.end(from, whole_from))?;
-        let last = to.as_ref().map_or(Ok(self.at.len()), |to| self.end(to, whole_up_to))?;
-        Ok(first..last)
+        match (self.bound(from)?, self.bound(to)?) {
+            (Some(from), Some(to)) => self.between(from, to),
+            (from, to) => self.within(from.unwrap_or(f64::NEG_INFINITY), to.unwrap_or(f64::INFINITY)),
+        }
     }
 
-    /// The voxel at an end of a box. `whole` gives that of a coordinate between two.
-    fn end(&self, place: &AxisPosition, whole: fn(f64) -> usize) -> std::result::Result<usize, String> {
+    /// The voxel at an end of a box that is no coordinate.
+    fn end(&self, place: &AxisPosition) -> std::result::Result<usize, String> {
         match place {
             AxisPosition::Voxel(voxel) if *voxel >= 0.0 && voxel.fract() == 0.0 => Ok(*voxel as usize),
             AxisPosition::Voxel(voxel) => Err(format!("a box ends at whole voxels, not at #{voxel}")),
             AxisPosition::Share(share) if (0.0..=1.0).contains(share) => {
                 Ok((share * self.at.len() as f64).round() as usize)
             }
-            AxisPosition::Share(_) => self.voxel(place).map(|_| 0),
-            AxisPosition::Coordinate(at, unit) => {
-                self.check_unit(unit).and_then(|()| self.place_or_beyond(*at)).map(whole)
-            }
+            AxisPosition::Share(_) | AxisPosition::Coordinate(..) => self.voxel(place).map(|voxel| voxel as usize),
         }
     }
 
-    /// The place of a coordinate in voxels; half a voxel beyond the first or the last if it is beyond.
-    fn place_or_beyond(&self, at: f64) -> std::result::Result<f64, String> {
-        let [first, last] = [self.at[0], self.at[self.at.len() - 1]];
-        self.index(at).or_else(|what| match (at < first.min(last), at > first.max(last)) {
-            (true, _) => Ok(if first <= last { -0.5 } else { self.at.len() as f64 - 0.5 }),
-            (_, true) => Ok(if first <= last { self.at.len() as f64 - 0.5 } else { -0.5 }),
-            _ => Err(what),
+    /// The coordinate at an end of a box; `None` if the end is open.
+    fn bound(&self, end: &Option<AxisPosition>) -> std::result::Result<Option<f64>, String> {
+        match end {
+            None => Ok(None),
+            Some(AxisPosition::Coordinate(at, unit)) => self.check_unit(unit).map(|()| Some(*at)),
+            Some(_) => Err("takes two coordinates, or two voxels or shares".into()),
+        }
+    }
+
+    /// The voxels between two coordinates. Those of a turn may be a whole turn away, in one piece.
+    fn between(&self, from: f64, to: f64) -> std::result::Result<Range<usize>, String> {
+        let name = &self.names[0];
+        let turns = self.unit.starts_with("degree");
+        if from > to && turns && self.at.first() < self.at.last() {
+            return Err(format!("{from} is above {to}: the lower end of the axis {name} comes first"));
+        }
+        let (from, to) = (from.min(to), from.max(to));
+        let mut widest = self.within(from, to)?;
+        for turn in if turns { vec![360.0, -360.0] } else { Vec::new() } {
+            let other = self.within(from + turn, to + turn)?;
+            let holds = |a: &Range<usize>, b: &Range<usize>| b.is_empty() || a.start <= b.start && b.end <= a.end;
+            match (holds(&widest, &other), holds(&other, &widest)) {
+                (true, _) => {}
+                (_, true) => widest = other,
+                _ => {
+                    return Err(format!(
+                        "{from} to {to} crosses the ends of the axis {name}: take its two sides one by one"
+                    ));
+                }
+            }
+        }
+        Ok(widest)
+    }
+
+    /// The voxels whose coordinates are from `low` to `high`.
+    fn within(&self, low: f64, high: f64) -> std::result::Result<Range<usize>, String> {
+        /// Coordinates this near to an end are at it, as shares of the least step: single precision rounds them.
+        const NEAR: f64 = 1e-2;
+        let descends = self.at.first() > self.at.last();
+        let steps = || self.at.windows(2).map(|pair| if descends { pair[0] - pair[1] } else { pair[1] - pair[0] });
+        if !steps().all(|step| step > 0.0) {
+            return Err(format!("the coordinates of the axis {} do not ascend; take voxels", self.names[0]));
+        }
+        let near = steps().reduce(f64::min).map_or(0.0, |step| NEAR * step);
+        let (low, high) = (low - near, high + near);
+        let before = |before: &dyn Fn(&f64) -> bool| self.at.partition_point(before);
+        Ok(match descends {
+            false => before(&|at| *at < low)..before(&|at| *at <= high),
+            true => before(&|at| *at > high)..before(&|at| *at >= low),
         })
     }
 
@@ -229,19 +261,6 @@ impl Axis {
         let share = voxel - low as f64;
         if share == 0.0 { self.at[low] } else { self.at[low] + share * (self.at[high] - self.at[low]) }
     }
-}
-
-/// Places this near to a voxel are there, in voxels.
-const ROUNDING: f64 = 1e-9;
-
-/// The first voxel from a place on.
-fn whole_from(place: f64) -> usize {
-    (place - ROUNDING).ceil() as usize
-}
-
-/// The voxel after the last one up to a place.
-fn whole_up_to(place: f64) -> usize {
-    ((place + ROUNDING).floor() + 1.0) as usize
 }
 
 /// Whether an axis of an array has no coordinates, and only the spacing of one that has: its voxels are counted.
@@ -296,22 +315,43 @@ mod tests {
             (":", 0..4, 0..4),
             ("50%:#4", 2..4, 2..4),
             ("@10:@50", 1..3, 1..3),
+            ("@50:@10", 1..3, 1..3),
             ("@5m:@60m", 1..3, 1..3),
             ("@-10:@200", 0..4, 0..4),
-            ("@11:", 2..4, 2..4),
+            ("@11:", 2..4, 0..2), // from 11 on
+            (":@11", 0..2, 2..4),
             ("@60:@70", 3..3, 1..1),
             ("@200:@300", 4..4, 0..0),
         ] {
             assert_eq!((range(&up, text), range(&down, text)), (Ok(ascending), Ok(descending)), "{text}");
         }
-        assert_eq!(range(&down, "@50:@10"), Ok(1..3));
-        for wrong in ["#1.5:", "120%:", "@5km:", "@-5s:"] {
+        for wrong in ["#1.5:", "120%:", "@5km:", "@-5s:", "@5:50%", "3:@50"] {
             assert!(range(&up, wrong).is_err(), "{wrong}");
         }
-        let mut lon = axis(&[0.0, 90.0, 180.0, 270.0]);
-        lon.unit = "degrees_east".into();
-        assert_eq!(range(&lon, "@80:@200"), Ok(1..3));
-        assert!(range(&lon, "@-100:@100").is_err_and(|what| what.contains("crosses the ends")));
+        assert_eq!(range(&axis(&[3.0]), "@5:@-5"), Ok(0..1));
+        for odd in [[0.0, 100.0, 50.0], [f64::NAN, 1.0, 2.0], [1.0, 1.0, 2.0]] {
+            assert!(range(&axis(&odd), ":@60").is_err_and(|what| what.contains("do not ascend")));
+        }
+        let singles: Vec<f64> = (400..500).map(|n| f64::from(n as f32 / 10.0)).collect();
+        assert_eq!(range(&axis(&singles), "@40.1:@40.2"), Ok(1..3));
+    }
+
+    #[test]
+    fn boxes_of_longitudes_may_be_a_turn_away() {
+        let degrees = |first: f64| -> Axis {
+            Axis { unit: "degrees_east".into(), ..axis(&(0..360).map(|n| first + f64::from(n)).collect::<Vec<_>>()) }
+        };
+        let range = |axis: &Axis, text: &str| text.parse().and_then(|ends| axis.range(&ends));
+        let (positive, signed, centres) = (degrees(0.0), degrees(-180.0), degrees(0.5));
+        assert_eq!(range(&positive, "@0:@360"), Ok(0..360));
+        assert_eq!(range(&positive, "@-20:@-10"), Ok(340..351));
+        assert_eq!(range(&signed, "@-180:@180"), Ok(0..360));
+        assert_eq!(range(&signed, "@190:@200"), Ok(10..21));
+        assert_eq!(range(&centres, "@-30:@0"), Ok(330..360));
+        for crossing in ["@-180:@180", "@-10:@355", "@-100:@100", "@350:@370"] {
+            assert!(range(&positive, crossing).is_err_and(|what| what.contains("crosses")), "{crossing}");
+        }
+        assert!(range(&positive, "@350:@10").is_err_and(|what| what.contains("comes first")));
     }
 
     #[test]

@@ -261,7 +261,7 @@ fn boxes_are_given_in_voxels_shares_and_coordinates() {
         work.read("r.npy")
     };
     let plain = region("2:7,4:7,2:5");
-    for same in ["@11:@13,25%:50%,#2:#5", "@10.9:@13.2,4:7,@0:@4", "2:7,4:7,@-0.5:50%"] {
+    for same in ["@11:@13,25%:50%,#2:#5", "@10.9:@13.2,4:7,@0:@4", "2:7,4:7,@4:@-0.5"] {
         assert!(region(same) == plain, "{same}");
     }
     work.wavesplat("convert a.npy -o b.wspl --spacing 0.5,1,2 --origin 10,0,-4 --region @11:@13,:,:").ok();

@@ -91,8 +91,8 @@ pub struct Cli {
     /// background
     #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true, help_heading = "Kernel")]
     pub(super) tau: f64,
-    /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing; along the ray 0.75 voxels of
-    /// each axis]
+    /// Standard deviation of the kernel in world units [default: 0.75 of the largest spacing; for composites, surfaces and
+    /// largest values 0.75 voxels along each axis]
     #[arg(long, value_name = "S", allow_hyphen_values = true, help_heading = "Kernel")]
     pub(super) sigma: Option<f64>,
     /// Error that splatting may add; more is faster. For means it is a share of the value range, at pixels with the

@@ -141,8 +141,8 @@ pub(super) struct SeriesArgs {
     /// or 120m. Values between voxels are interpolated linearly
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, help_heading = "Time series")]
     pub(super) probe: Vec<PointSpec>,
-    /// Write the mean, the least and the largest value of voxels x0:x1,y0:y1,z0:z1 over time instead of pictures; repeat
-    /// it for more regions
+    /// Write the mean, the least and the largest value of a box like that of --region over time instead of pictures; repeat
+    /// it for more boxes
     #[arg(long, value_name = "BOX", allow_hyphen_values = true, help_heading = "Time series")]
     pub(super) probe_region: Vec<RegionSpec>,
 }

@@ -33,6 +33,10 @@ impl FromStr for AxisPosition {
             return Ok(Self::Share(share));
         }
         let (at, unit) = split_unit(text.strip_prefix('@').unwrap_or(text));
+        let rest = unit.trim_start_matches(['e', 'E']).trim_start_matches(['+', '-']);
+        if rest.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+            return Err(wrong(text)); // a number in two pieces
+        }
         Ok(Self::Coordinate(number(at)?, unit.to_string()))
     }
 }
@@ -51,8 +55,8 @@ impl fmt::Display for AxisPosition {
     }
 }
 
-/// A box of voxels: `x0:x1,y0:y1,z0:z1`. The default of each end is that of the volume. A plain whole number is a voxel, and any other end is a
-/// position. Voxels and shares are where the box ends, so the last one is not in it; coordinates are in it.
+/// A box of voxels: `x0:x1,y0:y1,z0:z1`. The default of each end is that of the volume. Digits alone are a voxel, and any other end is a
+/// position. Voxels and shares are where the box ends, so the last one is not in it; coordinates are in it, the lower one first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegionSpec(pub [Ends; 3]);
 
@@ -84,23 +88,21 @@ impl FromStr for Ends {
     }
 }
 
-/// An end of a box.
+/// An end of a box. Digits alone are a voxel.
 fn end(text: &str) -> std::result::Result<AxisPosition, String> {
-    match text.trim().parse::<u32>() {
-        Ok(voxel) => Ok(AxisPosition::Voxel(voxel.into())),
-        Err(_) => text.parse(),
-    }
+    let is_voxel = text.trim().bytes().all(|byte| byte.is_ascii_digit());
+    if is_voxel { format!("#{}", text.trim()).parse() } else { text.parse() }
 }
 
 fn wrong_box() -> String {
-    "takes x0:x1,y0:y1,z0:z1, without x1, y1 and z1, like 0:32,:,10%:50%".into()
+    "takes x0:x1,y0:y1,z0:z1, without voxels x1, y1 and z1, like 0:32,:,10%:50% or @30:@45,:,:".into()
 }
 
 impl fmt::Display for RegionSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let end = |end: &Option<AxisPosition>| match end {
             None => String::new(),
-            Some(AxisPosition::Voxel(voxel)) if voxel.fract() == 0.0 => voxel.to_string(),
+            Some(AxisPosition::Voxel(voxel)) if voxel.fract() == 0.0 && voxel.is_sign_positive() => voxel.to_string(),
             Some(other) => other.to_string(),
         };
         let axis = |Ends { from, to }: &Ends| format!("{}:{}", end(from), end(to));
@@ -136,7 +138,12 @@ mod tests {
             assert_eq!(text(same), Ok(same.replace("50%", "0.5")), "{same}");
         }
         assert_eq!(text(" 2 : #4 ,:, -10m:"), Ok("2:4,:,@-10m:".into()));
-        for wrong in ["1:2,3:4", "1,2,3", "a:,:,:", "1:2:3,:,:"] {
+        for same in ["#-1:,:,:", "#-0:,:,:", "5000000000:,:,:", "-5:,:,:"] {
+            let region: RegionSpec = same.parse().expect("a box");
+            assert_eq!(region.to_string().parse(), Ok(region), "{same}");
+        }
+        assert_eq!(text("5000000000:,:,:"), Ok("5000000000:,:,:".into()));
+        for wrong in ["1:2,3:4", "1,2,3", "a:,:,:", "1:2:3,:,:", "@5 e5:,:,:", "@5 .:,:,:"] {
             assert!(text(wrong).is_err(), "{wrong}");
         }
     }

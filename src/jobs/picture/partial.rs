@@ -259,6 +259,8 @@ impl Sum<'_> {
         let targets = AllTargets::new(request, self.session.paths(), &config)?;
         self.check_memory(&targets, &config)?;
         let setup = total.setup();
+        // Rays are those through the voxels that are there.
+        let seen = RenderConfig { region: Some(total.bounds()), ..config.clone() };
         let input = ColouringInput {
             request,
             channels: setup.channels,
@@ -269,7 +271,7 @@ impl Sum<'_> {
             known: KnownSamples { least: None, are_of_body: setup.axes.iter().any(|axis| axis.sides.is_some()) },
         };
         let ranges =
-            |needed: Needed| if needed.pictures { self.ranges(&config, needed.beyond) } else { Ok(Ranges::default()) };
+            |needed: Needed| if needed.pictures { self.ranges(&seen, needed.beyond) } else { Ok(Ranges::default()) };
         let colouring = input.colouring(ranges, reporter)?;
         let mut annotation = annotation(request, setup.values.clone(), total.time_labels());
         let provenance = provenance(request, &setup.grid, &config, None, &annotation.times, &colouring);
@@ -279,8 +281,9 @@ impl Sum<'_> {
         note_scale(&annotation, reporter);
         note_title(request, &annotation, &config, reporter);
         let (targets, annotation) = (&targets, &annotation);
-        let (grid, config, colouring, provenance) = (&setup.grid, &config, &colouring, &provenance);
-        let mut sinks = SinkInput { request, grid, config, targets, colouring, provenance, annotation }.open()?;
+        let (grid, colouring, provenance) = (&setup.grid, &colouring, &provenance);
+        let mut sinks =
+            SinkInput { request, grid, config: &seen, targets, colouring, provenance, annotation }.open()?;
         let report = total.render(self.frames, progress.as_ref(), &mut |rendered| sinks.picture(&rendered))?;
         sinks.finish()?;
         let (parts, shown, seconds) = (total.parts(), config.shown().len(), report.seconds);

@@ -57,7 +57,7 @@ pub struct PictureRequest {
     pub convention: Convention,
     /// Attenuation per world unit of depth.
     pub tau: f64,
-    /// Standard deviation of the kernel in world units; by default 0.75 of the largest spacing.
+    /// Standard deviation of the kernel in world units; by default 0.75 of the largest spacing, or along the ray 0.75 voxels of each axis.
     pub sigma: Option<f64>,
     /// Error that splatting may add, as a share of the range.
     pub splat_error: Option<f64>,

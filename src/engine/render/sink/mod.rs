@@ -219,6 +219,9 @@ impl SinkConfig {
         let view = rendered.views.get(rendered.view);
         let Some((weighing, view)) = self.weighing.as_ref().zip(view) else { return picture.into() };
         let shares = weighing.rays.shares(view, self.size);
+        if shares.len() != picture.len() {
+            return picture.into();
+        }
         picture.iter().zip(shares).map(|(mean, share)| weighed(*mean, share, weighing.beyond)).collect()
     }
 

@@ -12,7 +12,7 @@ use crate::picture::values::{BeyondSpec, ModeName, Theme};
 use serde::Serialize;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Grid;
-use wavesplat_core::colour::{Clear, Distribution, Norm, Opacities, Rgb, Scale, TransferFunction};
+use wavesplat_core::colour::{Clear, Distribution, Norm, Rgb, Scale, TransferFunction};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::render::sink::PictureFormat;
 use wavesplat_engine::render::{Mode, Pixel, Quantity, RenderConfig, Scene};
@@ -183,7 +183,7 @@ pub(in crate::picture) fn automatic_colours(
     if modes::has_automatic_range(request)? {
         let needed = Needed { pictures: true, beyond: BeyondSpec::Nothing, errors: false };
         let ranges = Ranges::small(scene, config, needed, reporter)?;
-        colours = with_given_values(request, ranges.stretch(&colours)?)?;
+        colours = modes::with_given_values(request, ranges.stretch(&colours)?)?;
         overview = ranges.into_overview();
         let (lo, hi) = colours.range();
         reporter.detail(format_args!("colours from {lo:.4e} to {hi:.4e}; `range` sets them"));
@@ -195,14 +195,6 @@ pub(in crate::picture) fn automatic_colours(
     let planes = planes_of(&config.mode);
     config.mode = with_planes(modes::mode(request, Some(&colours))?, planes);
     Ok(Some(colours))
-}
-
-/// Colours whose range has all values at which opacities are given.
-fn with_given_values(request: &PictureRequest, colours: TransferFunction) -> Result<TransferFunction> {
-    let Some(Opacities::Points(points)) = &request.opacity else { return Ok(colours) };
-    let around = |range: (f64, f64), value: f64| (range.0.min(value), range.1.max(value));
-    let range = points.values().fold(colours.range(), around);
-    if range == colours.range() { Ok(colours) } else { colours.over(range) }
 }
 
 /// Says which surfaces no sample of the file reaches, and which have all samples on the source's sides.

@@ -111,6 +111,17 @@ pub(in crate::picture) fn suggests_opacities(request: &PictureRequest, colours: 
     suggests && mode_name(request).has_opacities()
 }
 
+/// Colours whose range has all values at which opacities are given, unless the range is given or stored with the colours.
+pub(in crate::picture) fn with_given_values(
+    request: &PictureRequest,
+    colours: TransferFunction,
+) -> Result<TransferFunction> {
+    let Some(Opacities::Points(points)) = &request.opacity else { return Ok(colours) };
+    let around = |(lo, hi): (f64, f64), value: f64| (lo.min(value), hi.max(value));
+    let range = points.values().fold(colours.range(), around);
+    if range == colours.range() || !has_automatic_range(request)? { Ok(colours) } else { colours.over(range) }
+}
+
 /// The length over which opacities apply.
 pub(in crate::picture) fn opacity_unit(request: &PictureRequest, grid: &Grid) -> f64 {
     request.opacity_unit.unwrap_or_else(|| grid.largest_spacing())
@@ -124,7 +135,8 @@ pub(in crate::picture) fn colours_of_file(
     let colours_samples = mode_name(request).colours_samples();
     let Some(name) = sample_colours(request).filter(|_| colours_samples) else { return Ok(None) };
     let colours = open_colours("transfer_function", name)?;
-    stretched(colours, request.range, || Ok(file.source_range())).map(Some)
+    let colours = stretched(colours, request.range, || Ok(file.source_range()))?;
+    with_given_values(request, colours).map(Some)
 }
 
 /// The mode with these colours, which a composite needs.

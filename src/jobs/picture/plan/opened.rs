@@ -94,7 +94,9 @@ impl Opened {
         let colours = match modes::sample_colours(request) {
             Some(name) => {
                 let is_piped = session.is_piped();
-                Some(colours_of_source(name, request.range, source.as_mut(), is_piped, missing_value, reporter)?)
+                let colours =
+                    colours_of_source(name, request.range, source.as_mut(), is_piped, missing_value, reporter)?;
+                Some(modes::with_given_values(request, colours)?)
             }
             None => None,
         };

@@ -29,9 +29,14 @@ pub(in crate::picture) fn panels(
     }
     let layouts = ARRANGEMENTS.map(|cuts| Layout::new(request, grid, cuts));
     let best = layouts.into_iter().max_by(|a, b| a.scale.total_cmp(&b.scale));
+    let shortest = (0..3).map(|axis| grid.dims[axis] as f64 * grid.spacing[axis]).fold(f64::INFINITY, f64::min);
+    let best = best.filter(|layout| layout.scale * shortest >= LEAST);
     let view = |layout: &Layout<'_>, plane: &Plane| layout.view(request, axes, grid, plane.axis);
     best.map_or(Ok(Vec::new()), |layout| planes.iter().map(|plane| view(&layout, plane)).collect())
 }
+
+/// The least pixels along a side of a panel. Where there is less room, slices stand in the volume.
+const LEAST: f64 = 4.0;
 
 /// Where panels lie.
 struct Layout<'a> {
@@ -64,7 +69,7 @@ impl<'a> Layout<'a> {
         let room = [width - right as f64, height - top as f64];
         let taken = |i: usize, count: usize| count as f64 * margins[i] + (count + 1) as f64 * gap;
         let fit = |i: usize, sides: &[f64]| (room[i] - taken(i, sides.len())) / sides.iter().sum::<f64>();
-        let scale = fit(0, &columns).min(fit(1, &rows)).max(f64::MIN_POSITIVE);
+        let scale = fit(0, &columns).min(fit(1, &rows));
         let spare = |i: usize, sides: &[f64]| room[i] - taken(i, sides.len()) - scale * sides.iter().sum::<f64>();
         let corner = [gap + spare(0, &columns) / 2.0, top as f64 + gap + spare(1, &rows) / 2.0];
         Self { cuts, scale, columns, rows, margins, gap, corner }

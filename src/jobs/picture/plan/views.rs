@@ -109,7 +109,7 @@ pub(in crate::picture) fn across_and_up(cut: usize) -> [usize; 2] {
 }
 
 /// The view that sees a slice across an axis face-on. A patient's anterior and superior sides are at the right or top, and the side that the
-/// convention asks for is at the left.
+/// convention asks for is at the right.
 pub(in crate::picture) fn view_across(request: &PictureRequest, axes: &Axes, cut: usize) -> View {
     let right = match request.convention {
         Convention::Neurological => 'R',

@@ -18,11 +18,14 @@ function tableOf(bytes) {
 
 // Maps with 0 in the middle of signed ranges: those in which one side of 0 is longer than this share of the other.
 const DIVERGING = ['coolwarm'], SIDE = 0.05;
+// Ranges that begin below this share of their end begin at 0.
+const NEAR = 0.25;
 
 // The range to stretch a map over, as src/colour/mod.rs has it.
 function suitable([low, high], map) {
   const isSigned = low < -SIDE * high && high > -SIDE * low, most = Math.max(high, -low);
-  return DIVERGING.includes(map) && isSigned ? [-most, most] : [low, high];
+  if (DIVERGING.includes(map) && isSigned) return [-most, most];
+  return [low >= 0 && low < NEAR * high ? 0 : low, high];
 }
 
 // The colours of values: a map over a range, which may be logarithmic and bent by gamma.
