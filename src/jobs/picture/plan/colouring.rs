@@ -1,8 +1,9 @@
 //! The colours of the pictures of a run.
 
 use super::modes;
+use super::pixels::is_of_means;
 use super::planes::{planes_of, with_planes};
-use super::ranges::{self, KnownSamples, Needed, Ranges, is_of_means};
+use super::ranges::{self, KnownSamples, Needed, Ranges};
 use super::targets::Targets;
 use super::value_colours::{clear_values, finds_clear, refuse_for_colours, value_colours, value_spread};
 use crate::picture::distributions::Distributions;

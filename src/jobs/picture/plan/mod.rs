@@ -10,6 +10,8 @@ mod views;
 mod panels;
 mod planes;
 pub(super) mod config;
+mod range_rules;
+pub(super) mod pixels;
 pub(super) mod ranges;
 mod value_colours;
 pub(super) mod colouring;

@@ -2,8 +2,8 @@
 
 use super::colouring::Colouring;
 use super::format::is_page;
+use super::pixels::rays;
 use super::provenance::error_provenance;
-use super::ranges::rays;
 use super::speed::frames_per_second;
 use super::targets::{AllTargets, Targets};
 use crate::picture::request::PictureRequest;
