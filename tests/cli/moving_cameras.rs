@@ -46,7 +46,7 @@ fn moving_views_are_numbered_by_frame_or_by_view() {
 fn key_frames_move_the_camera() {
     let work = Work::with_file("");
     work.write("keys.csv", "frame,azimuth,elevation,zoom\n1,20,10,1\n3,60,10,1\n5,60,50,2\n");
-    let render = |options: &str| work.render(&format!("a.wspl {SIZE} --beyond 0 {options}"));
+    let render = |options: &str| work.render(&format!("a.wspl {SIZE} {options}"));
     let stream = render("--key-frames keys.csv --frames :8 -o - --format rgb24").ok().out;
     let found = pictures(&stream);
     assert_eq!(found.len(), 8);

@@ -177,7 +177,7 @@ fn shards_of_time_and_trees_of_sums_give_the_pictures_of_one_file() {
     work.render("a.wspl -o whole.npy --orbit 6 --over-time --size 40x30 --force").ok();
     sum(&work, "m", "sum.npy");
     assert!(work.read("sum.npy") == work.read("whole.npy"), "a moving camera");
-    let colours = "--range -1,1 --beyond 0 --annotate=time";
+    let colours = "--range -1,1 --annotate=time";
     work.render(&format!("a.wspl -o w_%d_%v.png {views} --frames 27,72 {colours}")).ok();
     work.shell(&format!("$RENDER --sum t-2.wpart t-1.wpart -o s_%d_%v.png --frames 27,72 {colours}")).ok();
     for name in ["27_0", "27_1", "72_0", "72_1"] {

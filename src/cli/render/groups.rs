@@ -51,7 +51,8 @@ pub(super) struct ColourArgs {
     #[arg(long, value_name = "LO,HI", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     pub(super) clear: ClearSpec,
     /// Means in colours: rays shorter than the longest one are filled up with this value, so that the rim of a volume does
-    /// not stand out. auto is the value of empty space, or the median; none shows plain means
+    /// not stand out. auto is the value of empty space, or the median; with --range 0, or the middle if 0 is not in it;
+    /// none shows plain means
     #[arg(long, value_name = "V", default_value = "auto", allow_hyphen_values = true, help_heading = "Colour")]
     pub(super) beyond: BeyondSpec,
     /// Background colour, like ffffff [default: that of the theme]

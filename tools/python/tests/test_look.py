@@ -42,7 +42,7 @@ def test_pictures_are_those_of_the_program(tmp_path, path, file):
 
 def test_maps_of_matplotlib(file):
     matplotlib = pytest.importorskip("matplotlib")
-    options = {"frames": 3, "size": (48, 48), "range": (-2, 2), "clear": "none"}
+    options = {"frames": 3, "size": (48, 48), "range": (-2, 2), "clear": "none", "beyond": "none"}
     by_name, by_object = (file.render(colormap=map, **options) for map in ("RdBu", matplotlib.colormaps["RdBu"]))
     np.testing.assert_array_equal(by_name, by_object)
     values = file.render(**{key: options[key] for key in ("frames", "size")})[0]

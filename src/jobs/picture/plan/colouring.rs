@@ -75,7 +75,9 @@ impl ColouringInput<'_> {
         let errors_in_colours = self.errors.is_some_and(|errors| !errors.format.is_of_numbers());
         let fixed = self.fixed_range(pixel);
         let is_clear = self.may_be_clear(pixel) && finds_clear(request);
-        let beyond = if in_colours { self.beyond(pixel) } else { BeyondSpec::Nothing };
+        let sample_colours = self.colours.filter(|_| pixel != Pixel::Value);
+        let map = sample_colours.map_or_else(|| value_colours(request, self.known), |colours| Ok(colours.clone()))?;
+        let beyond = if in_colours { self.beyond(pixel, &map) } else { BeyondSpec::Nothing };
         let finds = fixed.is_none() || is_clear || beyond == BeyondSpec::Auto;
         let needed = Needed { pictures: in_colours && finds, beyond, errors: errors_in_colours };
         let ranges = ranges(needed)?;
@@ -83,8 +85,6 @@ impl ColouringInput<'_> {
             BeyondSpec::Value(value) => Some(value),
             BeyondSpec::Auto | BeyondSpec::Nothing => ranges.beyond,
         };
-        let sample_colours = self.colours.filter(|_| pixel != Pixel::Value);
-        let map = sample_colours.map_or_else(|| value_colours(request, self.known), |colours| Ok(colours.clone()))?;
         let (range, norm) = match pixel {
             Pixel::Value => value_spread(request, self.known, &map, &ranges, in_colours, reporter)?,
             _ => (fixed.unwrap_or(ranges.up_from_zero()), Norm::Linear),
@@ -109,9 +109,16 @@ impl ColouringInput<'_> {
     }
 
     /// The value beyond the volume, with which means are weighed. A logarithm is of plain means.
-    fn beyond(&self, pixel: Pixel) -> BeyondSpec {
+    fn beyond(&self, pixel: Pixel, map: &TransferFunction) -> BeyondSpec {
         let weighs = pixel == Pixel::Value && is_of_means(self.config) && self.request.norm == Norm::Linear;
-        if weighs { self.request.beyond } else { BeyondSpec::Nothing }
+        let fixed = (self.request.range.is_some() || map.is_of_values()).then(|| map.range());
+        match (self.request.beyond, fixed) {
+            _ if !weighs => BeyondSpec::Nothing,
+            // Pictures over one range compare, whatever else they show.
+            (BeyondSpec::Auto, Some((lo, hi))) if lo <= 0.0 && 0.0 <= hi => BeyondSpec::Value(0.0),
+            (BeyondSpec::Auto, Some((lo, hi))) => BeyondSpec::Value(lo / 2.0 + hi / 2.0),
+            (given, _) => given,
+        }
     }
 
     /// Whether some values may show the background. Slices show them all.

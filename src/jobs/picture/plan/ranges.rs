@@ -299,7 +299,7 @@ pub(in crate::picture) struct Ranges {
     pub(in crate::picture) errors: (f64, f64),
     /// The value beyond the volume, if means are weighed with it.
     pub(in crate::picture) beyond: Option<f64>,
-    /// The values of small pictures, as they are shown.
+    /// The values of small pictures, before they are weighed.
     all: Distribution,
     /// The overview that they show, if there is one.
     overview: Option<Overview>,
@@ -379,10 +379,8 @@ impl Ranges {
     fn set_values(&mut self, pixels: Pixels, beyond: BeyondSpec) {
         self.all = Distribution::new(pixels.values.clone());
         self.beyond = self.beyond(beyond);
-        if let Some(beyond) = self.beyond {
-            self.all = Distribution::new(pixels.weighed(beyond));
-        }
-        let values = self.all.values();
+        let weighed = self.beyond.map(|beyond| Distribution::new(pixels.weighed(beyond)));
+        let values = weighed.as_ref().unwrap_or(&self.all).values();
         if !values.is_empty() {
             self.values = robust_range(values);
             self.positive = values.iter().find(|v| **v > 0.0).map(|v| f64::from(*v));

@@ -120,7 +120,7 @@ def _shard(shard: tuple[int, int], path: str, *, source: Any, settings: dict[str
 TOGETHER = 8
 """Parts that one task adds."""
 
-OF_SUMS = ("colormap", "range", "norm", "clear", "background", "bar_title", "theme")
+OF_SUMS = ("colormap", "range", "norm", "clear", "beyond", "background", "bar_title", "theme")
 """Options of colours: parts of pictures have none."""
 
 OF_BOTH = ("annotate", "title", "memory")
