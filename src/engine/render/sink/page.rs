@@ -25,6 +25,7 @@ impl Page {
 
     /// Adds a picture, and writes the block that it completes.
     pub(super) fn picture(&mut self, rendered: &Rendered<'_>) -> Result<()> {
+        self.encoder.look(rendered);
         let (step, out) = (self.encoder.step(), &mut self.out);
         self.encoder.picture(rendered, &mut |block, planes| write(out, block, planes, step))
     }

@@ -96,10 +96,17 @@ impl PageEncoder {
             self.sequence = sequence;
         }
         self.push(picture);
-        if sequence == 0 {
+        if self.waiting.pictures() == per_block(size_of_val(picture)) { self.rest(give) } else { Ok(()) }
+    }
+
+    /// Takes note of how much there is to see in a picture of the first sequence, so that the page opens well.
+    pub(super) fn look(&mut self, rendered: &Rendered<'_>) {
+        let holds = |sequence: &Sequence| sequence.pictures.contains(&(rendered.view, rendered.frame));
+        if let Some(picture) =
+            self.config.shown_of(rendered).filter(|_| self.about.sequences.first().is_some_and(holds))
+        {
             self.spreads.push(spread(picture));
         }
-        if self.waiting.pictures() == per_block(size_of_val(picture)) { self.rest(give) } else { Ok(()) }
     }
 
     /// Gives the waiting pictures.

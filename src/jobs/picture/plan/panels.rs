@@ -10,8 +10,7 @@ use wavesplat_core::view::camera::{Camera, View};
 use wavesplat_engine::render::Plane;
 use wavesplat_engine::render::annotate::{Margins, line};
 
-/// The room of an axis in each column and row, by the number of the axis that a panel cuts: side by side, in two rows, or one below
-/// the other.
+/// The axes that panels cut, row by row: side by side, in two rows, or one below the other.
 const ARRANGEMENTS: [&[&[usize]]; 3] = [&[&[1, 0, 2]], &[&[1, 0], &[2]], &[&[1], &[0], &[2]]];
 
 /// Gaps between panels, in lines of letters: one line with room around.
