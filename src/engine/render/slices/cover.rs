@@ -126,7 +126,9 @@ impl Rays {
         let turn = (rises[0] * rises[1] < 0.0).then(|| turning_value(from, to, rises, share));
         let meeting = if (from.value < value) != (to.value < value) {
             let place = between(from, to, (value - from.value) / (to.value - from.value));
-            let is_turn_behind = self.rise(&place.gradient) * bend > 0.0;
+            // A ray that turns in this step, and first leads away from the value, has turned before.
+            let leads_away = (rises[0] > 0.0) != (from.value < value);
+            let is_turn_behind = if turn.is_some() { leads_away } else { self.rise(&place.gradient) * bend > 0.0 };
             let (end, rise) = if is_turn_behind { (from, rises[0]) } else { (to, rises[1]) };
             let beyond = || (end.value - value).abs() + rise * rise / (2.0 * bend.abs());
             let height = turn.map_or_else(beyond, |turn| (turn - value).abs());

@@ -132,6 +132,13 @@ impl Step<'_> {
         MayShow { passed, turned: turned.filter(|shown| shown.opacity.most > 0.0) }
     }
 
+    /// Whether the field rises through the surface of a value if that shows: it does if the field is below it before. `None` if that is not
+    /// certain.
+    pub(super) fn rises_through(&self, value: f32) -> Option<bool> {
+        let rises = || self.from.rises().filter(|_| self.is_monotone());
+        self.from.below(value).or_else(rises)
+    }
+
     /// Whether the first rise leads to the value; `None` if that is not certain.
     fn is_towards(&self, value: f32) -> Option<bool> {
         self.from.rises().zip(self.from.below(value)).map(|(rises, below)| rises == below)
@@ -141,7 +148,7 @@ impl Step<'_> {
         let distance = |place: &Place| Interval::size(place.point.value - value, place.error);
         let share = distance(self.from).share_of(distance(self.to));
         let (change, bend) = (self.change(share), self.bend());
-        let behind = self.turns_behind(&change);
+        let behind = self.turns_behind(value, &change);
         let height = self.height_of_passed(value, behind);
         let (covered, within) = (self.shares(height, change.across), self.within(share, &change, bend));
         let all = Interval { least: covered.least * within.least, most: covered.most * within.most };
@@ -199,10 +206,16 @@ impl Step<'_> {
     }
 
     /// Whether a ray turns back behind a place where it passes a surface.
-    fn turns_behind(&self, change: &Change) -> Option<bool> {
+    fn turns_behind(&self, value: f32, change: &Change) -> Option<bool> {
         let (rise, bend) = (change.rise, self.bend());
         let is_certain = !rise.holds(0.0) && !bend.holds(0.0);
-        is_certain.then_some((rise.least > 0.0) == (bend.least > 0.0))
+        let straight = is_certain.then_some((rise.least > 0.0) == (bend.least > 0.0));
+        let turned = self.is_towards(value).map(|leads_to_it| !leads_to_it);
+        match self.turns() {
+            Some(true) => turned,
+            Some(false) => straight,
+            None => straight.filter(|_| straight == turned),
+        }
     }
 
     /// How far the ray goes beyond a surface that it passes.

@@ -54,19 +54,19 @@ impl Isosurfaces {
         }
         let mut add = |n: usize| {
             if let Some(meeting) = self.rays.meeting(self.values[n], from, to) {
-                self.put(light, n, meeting.gradient, meeting.opacity(self.surfaces[n].opacity as f32));
+                let lit = self.shader.shade_surface(meeting.gradient, from.value < self.values[n]);
+                self.put(light, n, lit, meeting.opacity(self.surfaces[n].opacity as f32));
             }
         };
         let all = 0..self.values.len();
         if from.value < to.value { all.for_each(&mut add) } else { all.rev().for_each(&mut add) }
     }
 
-    /// Adds the light of a surface with this opacity.
-    fn put(&self, light: &mut [f32; 4], n: usize, gradient: [f32; 3], opacity: f32) {
-        let [colour, gloss] = self.shader.shade_one(gradient.map(f64::from));
+    /// Adds a surface with this share of its colour, gloss and opacity.
+    fn put(&self, light: &mut [f32; 4], n: usize, [colour, gloss]: [f32; 2], opacity: f32) {
         let through = light[3] * opacity;
         for (sum, c) in light.iter_mut().zip(self.surfaces[n].colour) {
-            *sum += through * (c * colour + gloss).min(1.0) as f32;
+            *sum += through * (c as f32 * colour + gloss).min(1.0);
         }
         light[3] -= through;
     }

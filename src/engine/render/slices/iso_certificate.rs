@@ -157,9 +157,7 @@ impl<'a> IsoCertificate<'a> {
         let run = group.runs[i].get_or_insert_with(|| Run::new(self.below(from), start));
         let step = Step { rays: &self.surfaces.rays, from, to };
         run.is_monotone &= step.is_monotone();
-        for (n, value) in self.surfaces.values.iter().enumerate() {
-            self.add_surface(run, n, &step, step.may_show(*value, self.opacity(n)));
-        }
+        (0..self.surfaces.values.len()).for_each(|n| self.add_surface(run, n, &step));
         self.surfaces.pass(&mut group.front.light[i], &from.point, &to.point);
         let below = self.below(to);
         if below.is_some() {
@@ -168,7 +166,8 @@ impl<'a> IsoCertificate<'a> {
     }
 
     /// Adds the ways in which a surface may show in a step.
-    fn add_surface(&self, run: &mut Run, n: usize, step: &Step<'_>, MayShow { passed, turned }: MayShow) {
+    fn add_surface(&self, run: &mut Run, n: usize, step: &Step<'_>) {
+        let MayShow { passed, turned } = step.may_show(self.surfaces.values[n], self.opacity(n));
         let Some(share) = [passed, turned].into_iter().flatten().map(|shown| shown.share).reduce(Interval::hull) else {
             return;
         };
@@ -185,7 +184,8 @@ impl<'a> IsoCertificate<'a> {
     fn add_light(&self, run: &mut Run, n: usize, step: &Step<'_>, share: Interval) {
         let ends = [step.from, step.to].map(|place| place.point.gradient);
         let off = step.from.gradient_error.max(step.to.gradient_error);
-        let [least, largest] = self.surfaces.shader.between(ends, [share.least, share.most], off);
+        let rises = step.rises_through(self.surfaces.values[n]);
+        let [least, largest] = self.surfaces.shader.between(ends, [share.least, share.most], off, rises);
         for (c, colour) in self.surfaces.surfaces[n].colour.into_iter().enumerate() {
             let light = |[share, gloss]: [f32; 2]| (colour as f32 * share + gloss).min(1.0);
             run.dark[c] = run.dark[c].min(light(least));

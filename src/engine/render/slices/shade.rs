@@ -64,18 +64,24 @@ impl Shader {
     }
 
     /// How far the share of the colour and the gloss of a cell may be off, if its gradient per voxel may be off by a vector of the length
-    /// `off` per world unit.
+    /// `off` per world unit. Where it may be turned to the other side, nothing is known of its direction.
+    #[inline(always)]
+    pub(super) fn doubt(&self, gradient: [f32; 3], off: f32) -> [f32; 2] {
+        let slope = self.per_world_unit(gradient);
+        let facing = dot(slope, self.to_viewer);
+        self.doubt_of_side(slope, sign_of_seen(facing), off, facing.abs() > off)
+    }
+
+    /// [`Self::doubt`] for a gradient of this sign per world unit.
     ///
     /// The directions of two vectors x and y differ by at most 2 |x - y| / (|x| + |y|) ([Dunkl](wavesplat_core::bibliography)).
     #[inline(always)]
-    pub(super) fn doubt(&self, gradient: [f32; 3], off: f32) -> [f32; 2] {
+    fn doubt_of_side(&self, slope: [f32; 3], sign: f32, off: f32, is_certain: bool) -> [f32; 2] {
         let Light { ambient, diffuse, specular, .. } = self.light;
         let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
-        let slope = self.per_world_unit(gradient);
-        let (length, facing) = (dot(slope, slope).sqrt(), dot(slope, self.to_viewer));
-        let turned = if facing < 0.0 { -1.0 } else { 1.0 } / length.max(f32::MIN_POSITIVE);
-        // Where it may be turned to the other side, nothing is known of the direction.
-        let turns = if facing.abs() > off { 2.0 * off / (2.0 * length - off) } else { 1.0 };
+        let length = dot(slope, slope).sqrt();
+        let turned = sign / length.max(f32::MIN_POSITIVE);
+        let turns = if is_certain && length > off { 2.0 * off / (2.0 * length - off) } else { 1.0 };
         let [lamp, middle] = [self.to_lamp, self.to_middle].map(|to| (dot(slope, to) * turned).clamp(0.0, 1.0));
         let (lamp_off, [least, largest]) = (turns.min(lamp.max(1.0 - lamp)), [middle - turns, middle + turns]);
         let [least, gloss, largest] = [least.max(0.0), middle, largest.min(1.0)].map(thirty_second);
@@ -88,20 +94,26 @@ impl Shader {
         [colour, of_gloss].map(|off| off + OF_LIGHT * self.brightest())
     }
 
-    /// The least and the largest share of the colour, each with the gloss, of points from a share of the way between two gradients per voxel to
-    /// another. The gradients may be off by vectors of the length `off` per world unit.
-    pub(super) fn between(&self, [from, to]: [[f32; 3]; 2], shares: [f32; 2], off: f32) -> [[f32; 2]; 2] {
+    /// The least and the largest share of the colour, each with the gloss, of points of a surface from a share of the way between two
+    /// gradients per voxel to another. The gradients may be off by vectors of the length `off` per world unit. Whether the field rises
+    /// through the surface may not be certain.
+    pub(super) fn between(
+        &self,
+        [from, to]: [[f32; 3]; 2],
+        shares: [f32; 2],
+        off: f32,
+        rises: Option<bool>,
+    ) -> [[f32; 2]; 2] {
         let most = from.iter().chain(&to).fold(f32::MIN_POSITIVE, |most, n| most.max(n.abs()));
         let [middle, half] = [0.5 * (shares[0] + shares[1]), 0.5 * (shares[1] - shares[0])];
         let way: [f32; 3] = std::array::from_fn(|i| to[i] / most - from[i] / most);
-        let at = std::array::from_fn(|i| from[i] / most + middle * way[i]);
+        let slope = self.per_world_unit(std::array::from_fn(|i| from[i] / most + middle * way[i]));
         let way = self.per_world_unit(way);
         let off = off / most + half * dot(way, way).sqrt();
-        let slope = self.per_world_unit(at);
-        if dot(slope, self.to_viewer).abs() <= off {
+        let Some(sign) = rises.map(sign_of_rise).filter(|_| dot(slope, slope).sqrt() > off) else {
             return self.any_direction(); // also that of no gradient
-        }
-        let (lit, doubt) = (self.shade_cell(at), self.doubt(at, off));
+        };
+        let (lit, doubt) = (self.lit(slope, sign), self.doubt_of_side(slope, sign, off, true));
         [-1.0, 1.0].map(|sign| std::array::from_fn(|i| (lit[i] + sign * doubt[i]).max(0.0)))
     }
 
@@ -127,25 +139,47 @@ impl Shader {
 
     /// [`Self::shade`] for one gradient.
     pub(super) fn shade_one(&self, gradient: [f64; 3]) -> [f64; 2] {
+        self.shade_cell(gradient.map(|n| n as f32)).map(f64::from)
+    }
+
+    /// The light of a surface through which the field rises along the ray, or falls. Its own gradient would say less at silhouettes,
+    /// where it is that of a place nearby, and may face away.
+    pub(super) fn shade_surface(&self, gradient: [f32; 3], rises: bool) -> [f32; 2] {
         // A direction of the middle size of numbers: squares of others may not be numbers.
-        let most = gradient.iter().fold(0.0, |most: f64, n| most.max(n.abs()));
-        let scaled = if self.faint == 0.0 && most > 0.0 { gradient.map(|n| n / most) } else { gradient };
-        self.shade_cell(scaled.map(|n| n as f32)).map(f64::from)
+        let most = gradient.iter().fold(0.0, |most: f32, n| most.max(n.abs()));
+        let scaled = if most > 0.0 { gradient.map(|n| n / most) } else { gradient };
+        self.lit(self.per_world_unit(scaled), sign_of_rise(rises))
     }
 
     #[inline(always)]
     fn shade_cell(&self, gradient: [f32; 3]) -> [f32; 2] {
+        let slope = self.per_world_unit(gradient);
+        self.lit(slope, sign_of_seen(dot(slope, self.to_viewer)))
+    }
+
+    /// The light on a gradient of this sign per world unit.
+    #[inline(always)]
+    fn lit(&self, slope: [f32; 3], sign: f32) -> [f32; 2] {
         let Light { ambient, diffuse, specular, .. } = self.light;
         let [ambient, diffuse, specular] = [ambient, diffuse, specular].map(|part| part as f32);
-        let slope = self.per_world_unit(gradient);
         let square = dot(slope, slope);
-        let length = square.max(f32::MIN_POSITIVE).sqrt();
-        let turned = if dot(slope, self.to_viewer) < 0.0 { -1.0 } else { 1.0 } / length;
+        let turned = sign / square.max(f32::MIN_POSITIVE).sqrt();
         let lamp = (dot(slope, self.to_lamp) * turned).max(0.0);
         let share = square / (square + self.faint).max(f32::MIN_POSITIVE);
         let gloss = share * specular * thirty_second((dot(slope, self.to_middle) * turned).max(0.0));
         [1.0 + share * (ambient + diffuse * lamp - 1.0), gloss]
     }
+}
+
+/// The sign that turns a gradient to the viewer.
+#[inline(always)]
+fn sign_of_seen(facing: f32) -> f32 {
+    if facing < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// The sign that turns a gradient to the viewer if the field rises along the ray, or falls.
+fn sign_of_rise(rises: bool) -> f32 {
+    if rises { -1.0 } else { 1.0 }
 }
 
 /// The rounding of the light on a cell.
@@ -186,8 +220,16 @@ mod tests {
                 let turned = unit(std::array::from_fn(|_| random()));
                 let length = if n % 2 == 0 { off } else { off * random().abs() };
                 let moved = std::array::from_fn(|i| gradient[i] + turned[i] * length / per[i]);
-                let [from, to] = [gradient, moved].map(|gradient| shader.shade_cell(gradient));
-                let doubt = shader.doubt(gradient, off);
+                let slope = shader.per_world_unit(gradient);
+                let (lights, doubt): ([[f32; 2]; 2], _) = match n % 3 {
+                    0 => {
+                        let sign = sign_of_rise(n % 2 == 0);
+                        let of_side = |gradient| shader.lit(shader.per_world_unit(gradient), sign);
+                        ([gradient, moved].map(of_side), shader.doubt_of_side(slope, sign, off, true))
+                    }
+                    _ => ([gradient, moved].map(|gradient| shader.shade_cell(gradient)), shader.doubt(gradient, off)),
+                };
+                let [from, to] = lights;
                 for i in 0..2 {
                     let moved = (from[i] - to[i]).abs();
                     assert!(moved <= doubt[i], "{faint}: {gradient:?} by {off}, {from:?} to {to:?}, {doubt:?}");
