@@ -51,7 +51,7 @@ impl Browser {
         let target = browser.ask("Target.createTarget", &json!({ "url": "about:blank" }))["targetId"].clone();
         let attached = browser.ask("Target.attachToTarget", &json!({ "targetId": target, "flatten": true }));
         browser.session = Some(attached["sessionId"].as_str().unwrap().into());
-        for domain in ["Page", "Runtime", "Log"] {
+        for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.ask(&format!("{domain}.enable"), &json!({}));
         }
         browser.resize(size);
@@ -115,11 +115,32 @@ impl Browser {
     /// Waits until an expression is true.
     #[track_caller]
     pub(super) fn wait(&mut self, expression: &str) {
+        assert!(self.has(expression), "never {expression}: {:?}", self.complaints);
+    }
+
+    /// Whether an expression becomes true in time.
+    pub(super) fn has(&mut self, expression: &str) -> bool {
         let started = Instant::now();
         while self.js(&format!("!!({expression})")) != true {
-            assert!(started.elapsed() < LONGEST, "never {expression}: {:?}", self.complaints);
+            if started.elapsed() > LONGEST {
+                return false;
+            }
             std::thread::sleep(Duration::from_millis(20));
         }
+        true
+    }
+
+    pub(super) fn reload(&mut self) {
+        self.js("void (window.player = null)");
+        self.ask("Page.reload", &json!({}));
+        self.wait("document.readyState === 'complete' && typeof player === 'object' && player !== null");
+    }
+
+    /// Makes the network slow, or as it was.
+    pub(super) fn slow_network(&mut self, is_slow: bool) {
+        let bytes = if is_slow { 1e6 } else { -1.0 };
+        let state = json!({ "offline": false, "latency": if is_slow { 60 } else { 0 }, "downloadThroughput": bytes, "uploadThroughput": bytes });
+        self.ask("Network.emulateNetworkConditions", &state);
     }
 
     /// The RGB bytes of the picture.
@@ -137,7 +158,8 @@ impl Browser {
     pub(super) fn set(&mut self, id: &str, value: &Value) {
         let property = if value.is_boolean() { "checked" } else { "value" };
         self.js(&format!(
-            "(() => {{ const e = element('{id}'); e.{property} = {value}; \
+            "(() => {{ const radio = document.querySelector(`[name='{id}'][value='${{{value}}}']`), e = radio ?? element('{id}'); \
+             if (radio) radio.checked = true; else e.{property} = {value}; \
              for (const n of ['input', 'change']) e.dispatchEvent(new Event(n, {{ bubbles: true }})); }})()"
         ));
     }

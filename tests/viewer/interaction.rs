@@ -84,9 +84,9 @@ fn changing_time_and_colours_sends_no_request() {
         browser.wait(&format!("document.documentElement.dataset.drawn === '0:{frame}'"));
     }
     browser.key(" ");
-    browser.wait("player.index < 10 && player.isPlaying");
+    browser.wait("player.index < 10 && player.time.isPlaying");
     browser.key(" ");
-    browser.wait("!player.isPlaying");
+    browser.wait("!player.time.isPlaying");
     assert_eq!(browser.js("asked.length"), 0);
     browser.key("d");
     browser.wait(&format!("asked.length > 0 && {FULL}"));
@@ -129,12 +129,10 @@ fn opacities_are_drawn_by_hand() {
     let work = converted("");
     let _served = opened(&work, &mut browser);
     browser.set("mode", &json!("composite"));
-    browser.wait("document.querySelectorAll('#opacity rect').length === 64");
+    browser.wait("document.querySelectorAll('#bar-plot rect').length === 64");
     browser.wait(FULL);
     let (_, before) = browser.picture();
-    browser.js(
-        "steering.opacity.points = [[0, 0], [0.5, 1], [1, 1]]; steering.opacity.changed([[0, 0], [0.5, 1], [1, 1]])",
-    );
+    browser.js("player.bar.points = [[0, 0], [0.5, 1], [1, 1]]; player.bar.give()");
     browser.wait(FULL);
     let (_, after) = browser.picture();
     assert!(before != after);
@@ -156,7 +154,7 @@ fn the_page_waits_for_a_server_that_comes_back() {
     let again = Served::start_with(&work, &format!("a.wspl --port {port}"), token);
     assert_eq!(again.address, address);
     browser.wait(&format!("{FULL} && element('status').textContent === ''"));
-    let is_wanted = "steering.live.kept.get(steering.live.key(true)).get(player.index).planes[0].every((value, n) => !(Math.abs(value - player.shown.planes[0][n]) > 1e-4))";
+    let is_wanted = "steering.live.kept.get(steering.live.key('full')).get(player.index).planes[0].every((value, n) => !(Math.abs(value - player.shown.planes[0][n]) > 1e-4))";
     assert!(browser.js("steering.live.look.view[0]") != 30 && browser.js(is_wanted) == true);
 }
 

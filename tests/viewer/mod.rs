@@ -7,6 +7,7 @@ mod foreign_requests; // requests that no page of the viewer sends
 mod interaction; // dragging, the wheel, keys, sliders, playing
 mod pages; // pages that hold their pictures
 mod pixels_match_program; // pixels of the page are those of `wavesplat-render`
+mod random_actions; // a thousand actions, reloads and links
 mod request_priority; // which request is answered first
 mod running_viewer; // helper: a running `wavesplat view`
 

@@ -23,8 +23,8 @@ fn pages_show_the_pictures_of_the_program() {
         work.render(&format!("a.wspl {options} --size 150x110 -o page_{n}.html")).ok();
         browser.open_file(&work.path(format!("page_{n}.html")));
         let views = browser.js("player.source.sequences.length").as_u64().unwrap();
-        let bar = browser.js("element('bar').style.visibility");
-        assert_eq!(bar == "hidden", options.contains("--iso"), "{options}: {bar}");
+        let bar = browser.js("element('bar').hidden");
+        assert_eq!(bar == true, options.contains("--iso"), "{options}: {bar}");
         let (view, frame) = (views - 1, 6);
         browser.js(&format!("player.choose({view}); player.show({frame})"));
         browser.wait(&format!("document.documentElement.dataset.drawn === '{view}:{frame}'"));

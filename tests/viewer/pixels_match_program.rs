@@ -2,6 +2,7 @@
 
 use super::browser::Browser;
 use super::converted;
+use super::interaction::FULL;
 use super::running_viewer::Served;
 use crate::cli::Work;
 use crate::cli::render::decode_png;
@@ -12,6 +13,14 @@ use serde_json::{Value, json};
 fn assert_agrees(browser: &mut Browser, work: &Work, frame: usize, what: &str) {
     browser.js(&format!("player.show({frame})"));
     browser.wait(&format!("!steering.live.isMoving && document.documentElement.dataset.filled === '{frame}'"));
+    assert_shown(browser, work, what);
+    let (_, found) = browser.picture();
+    assert!(found.iter().any(|level| *level != found[0]), "{what}: nothing to see");
+}
+
+/// Asserts that the copied command draws what is shown.
+#[track_caller]
+pub(super) fn assert_shown(browser: &mut Browser, work: &Work, what: &str) {
     let command = browser.js("steering.live.made('command', 'picture.png').then(answer => answer.text())");
     let command = command.as_str().unwrap();
     work.shell(&format!("{} --force", command.replacen("wavesplat-render", "$RENDER", 1))).ok();
@@ -20,7 +29,6 @@ fn assert_agrees(browser: &mut Browser, work: &Work, frame: usize, what: &str) {
     assert!(found.len() == expected.len() && found.len() == 3 * size[0] * size[1], "{what}: {size:?}");
     let off = found.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
     assert!(off <= 1, "{what}: off by {off}: {command}");
-    assert!(found.iter().any(|level| *level != found[0]), "{what}: nothing to see");
 }
 
 /// Chooses a mode with its settings, and waits until its picture is there.
@@ -75,10 +83,10 @@ fn certified_errors_hold_for_the_pictures() {
     let served = Served::start(&work, "a.wspl");
     browser.open(&served.address);
     choose(&mut browser, &[("mode", json!("error"))]);
-    browser.wait("player.shown?.beneath");
+    browser.wait(&format!("player.shown?.beneath && {FULL}"));
     let [coded, error] = ["beneath", "planes[0]"]
         .map(|of| browser.js(&format!("Array.from(player.shown.{of}, v => Number.isNaN(v) ? null : v)")));
-    let look = browser.js("JSON.stringify(steering.live.request([player.index, player.index + 1], true).look)");
+    let look = browser.js("JSON.stringify(steering.live.request([player.index, player.index + 1], 'full').look)");
     let raw = Served::start(&work, "a.npy");
     browser.open(&raw.address);
     let read = format!(

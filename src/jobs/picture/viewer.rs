@@ -64,6 +64,8 @@ struct Facts {
     range: Option<(f64, f64)>,
     /// The coarsest level of detail.
     coarsest: u32,
+    /// Most numbers of an answer.
+    numbers: usize,
     maps: BTreeMap<String, String>,
 }
 
@@ -86,7 +88,7 @@ pub struct Histogram {
     range: Option<(f64, f64)>,
     /// How many values lie in each of equal parts of the range.
     counts: Vec<usize>,
-    /// A value with a surface: halfway from the most common value to the end that is farther from it.
+    /// A value with a surface: halfway from the most common value to the end of the others that is farther from it, but for rare ones.
     surface: Option<f64>,
 }
 
@@ -146,6 +148,7 @@ impl ViewerSession {
             axes: axes.labels(),
             range: file.as_ref().map(|file| file.source_range()),
             coarsest: file.as_ref().map_or(0, |file| file.coarsest_detail()),
+            numbers: (self.session.memory / BYTES_PER_NUMBER / 4).min(MOST_NUMBERS),
             maps: page::maps()?,
         })
     }
@@ -310,7 +313,9 @@ impl Histogram {
         let bar = |value: f32| ((f64::from(value) - lo) / (hi - lo) * BARS as f64) as usize;
         values.iter().for_each(|value| counts[bar(*value).min(BARS - 1)] += 1);
         let common = samples.empty((lo, hi)).or_else(|| samples.common((lo, hi))).map_or(lo, |common| common.value);
-        let end = if hi - common >= common - lo { hi } else { lo };
+        let of_rank = |share: f64| f64::from(values[((values.len() - 1) as f64 * share) as usize]);
+        let [least, most] = [RARE, 1.0 - RARE].map(of_rank);
+        let end = if most - common >= common - least { most } else { least };
         Self { range, counts, surface: Some((common + end) / 2.0) }
     }
 }
@@ -318,7 +323,7 @@ impl Histogram {
 /// Refuses pictures of more numbers than half of the memory takes.
 fn check_memory(sink: &SinkConfig, memory: usize) -> Result<()> {
     let numbers = sink.size[0] * sink.size[1] * sink.pixel.numbers();
-    let bytes = numbers.saturating_mul(sink.shown.len()).saturating_mul(2 * size_of::<f32>());
+    let bytes = numbers.saturating_mul(sink.shown.len()).saturating_mul(BYTES_PER_NUMBER);
     if bytes <= memory / 2 {
         return Ok(());
     }
@@ -335,6 +340,14 @@ fn opacities(mode: &Mode) -> Option<Vec<(f64, f64)>> {
 
 /// One part in so many of the memory holds finished answers.
 const ANSWERS_SHARE: usize = 8;
+
+/// Bytes that a number of an answer takes: as a picture, and in the answer.
+const BYTES_PER_NUMBER: usize = 2 * size_of::<f32>();
+/// Most numbers that a page asks for at once.
+const MOST_NUMBERS: usize = 1 << 24;
+
+/// The share of samples at either end that are rare: a surface of them alone would hardly be seen.
+const RARE: f64 = 0.002;
 
 /// Parts of a histogram: many more than a page draws, for it may draw a part of the range.
 const BARS: usize = 2048;

@@ -1,7 +1,9 @@
 //! Web pages that show pictures: their description, their blocks of pictures, and the page around both.
 //!
 //! `web/` holds what the browser runs: plain HTML, CSS and JavaScript, compiled into the program. `block.js` reads blocks,
-//! `colours.js` turns numbers into pixels, `player.js` shows them, and `stored.js` finds them in the page itself.
+//! `colours.js` turns numbers into pixels, `player.js` shows them with the colour bar (`bar.js`) and the time line (`timeline.js`), `address.js`
+//! keeps the state in the address, and `stored.js` finds pictures in the page itself. In the viewer, `live.js` asks its server for them, and
+//! `steer.js` turns what the user does into requests.
 
 mod about;
 mod block;
@@ -22,16 +24,14 @@ const STYLE: &str = include_str!("web/page.css");
 const SCRIPT: &str = concat!(
     include_str!("web/block.js"),
     include_str!("web/colours.js"),
+    include_str!("web/address.js"),
+    include_str!("web/bar.js"),
+    include_str!("web/timeline.js"),
     include_str!("web/player.js"),
     include_str!("web/stored.js"),
 );
 /// The scripts for pages that ask a server for pictures.
-const LIVE: &str = concat!(
-    include_str!("web/camera.js"),
-    include_str!("web/live.js"),
-    include_str!("web/opacity.js"),
-    include_str!("web/steer.js"),
-);
+const LIVE: &str = concat!(include_str!("web/camera.js"), include_str!("web/live.js"), include_str!("web/steer.js"),);
 const CONTROLS: &str = include_str!("web/controls.html");
 const SAVING: &str = include_str!("web/saving.html");
 /// Begins to show pictures.

@@ -99,22 +99,30 @@ function paintChannels(planes, scale, background, pixels) {
 
 // The lengths of the rays of all pixels, as shares of the longest one, as src/engine/render/ray_lengths.rs has them.
 function sharesOf({ from, right, down, along, ends, longest }, [width, height]) {
-  return Float32Array.from({ length: width * height }, (_, at) => {
-    const x = at % width, y = Math.floor(at / width);
-    let near = -Infinity, far = Infinity;
-    for (let a = 0; a < 3; a++) {
-      const start = from[a] + x * right[a] + y * down[a], [low, high] = ends[a];
-      if (along[a] === 0 && !(low <= start && start <= high)) return 0;
-      if (along[a] === 0) continue;
-      const one = (low - start) / along[a], other = (high - start) / along[a];
-      near = Math.max(near, Math.min(one, other));
-      far = Math.min(far, Math.max(one, other));
+  const shares = new Float32Array(width * height);
+  for (let y = 0, at = 0; y < height; y++) {
+    for (let x = 0; x < width; x++, at++) {
+      let near = -Infinity, far = Infinity;
+      for (let a = 0; a < 3; a++) {
+        const start = from[a] + x * right[a] + y * down[a], low = ends[a][0] - start, high = ends[a][1] - start;
+        if (along[a] === 0) {
+          if (low > 0 || high < 0) far = -Infinity;
+          continue;
+        }
+        const one = low / along[a], other = high / along[a];
+        near = Math.max(near, Math.min(one, other));
+        far = Math.min(far, Math.max(one, other));
+      }
+      shares[at] = Math.min(Math.max(far - near, 0) / longest, 1);
     }
-    return Math.min(Math.max(far - near, 0) / longest, 1);
-  });
+  }
+  return shares;
 }
 
 // Values as if all rays were equally long (eq 51).
 function weighed(values, shares, beyond) {
-  return shares ? values.map((value, i) => beyond + shares[i] * (value - beyond)) : values;
+  if (!shares) return values;
+  const found = new Float32Array(values.length);
+  for (let i = 0; i < found.length; i++) found[i] = beyond + shares[i] * (values[i] - beyond);
+  return found;
 }

@@ -1,13 +1,25 @@
 // The source of a page that asks its server for pictures.
 
-const FULL_PIXELS = 1024, MOVING_PIXELS = 288; // sides of pictures at rest, and while something moves
-const BLOCK_FRAMES = 32, BLOCK_NUMBERS = 2 ** 24; // frames of a request, and their numbers
+const BLOCK_FRAMES = 32, COARSE_FRAMES = 8; // frames of a request
+const BLOCK_TIME = 1500; // milliseconds that a block of full pictures may take
+const STEPS = 3; // frames whose coarse pictures are loaded ahead of a step in time
 const REST = 250; // milliseconds without a change after which pictures are complete
+const IDLE = 40; // milliseconds after a full picture until others are loaded ahead
 const PATIENCE = 600; // milliseconds after which a request says how far it is
 const SLOW = 30e6; // bytes per second below which answers are packed
 
 // Ranks of requests. A request never cancels one of higher rank.
 const AHEAD = 0, PLOT = 1, USER = 2;
+
+// Qualities of pictures: the coarse ones come first, and sharp ones fill every pixel of a dense screen.
+const COARSE = 'coarse', FULL = 'full', SHARP = 'sharp', QUALITIES = [COARSE, FULL, SHARP];
+const FULL_PIXELS = 1280, SHARP_PIXELS = 4096; // most pixels along a side
+const DENSER = 1.2; // sharp pictures have this many times as many pixels along a side
+
+// Coarse pictures: the pixels of their longer side, and their level of detail. Each mode takes those that answer in time.
+const COARSER = [[288, 1], [288, 2], [192, 2], [128, 3]], FIRST = 1;
+const SOON = 25, LATE = 70; // milliseconds: two quicker answers make the next ones finer, two slower ones coarser
+const SMOOTH = 60; // milliseconds that a full picture may take to be played
 
 class Stale extends Error {}
 
@@ -28,7 +40,10 @@ class Live {
     this.opening = facts.opening;
     this.sequences = [{ label: '', pictures: facts.labels.map((_, frame) => ({ view: 0, frame })) }];
     this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: 'box,axes', ...this.home() };
-    this.known = {}; // automatic range and clear values of each mode, from its first answer
+    this.known = {}; // automatic colours and opacities of each mode, from its first full answer, or a coarse one until then
+    this.coarser = {}; // which coarse pictures each mode takes
+    this.pace = {}; // milliseconds that a full picture of each mode takes
+    this.lastPace = {}; // and that its last coarse picture took
     this.kept = new Map(); // pictures of each look, the last one used at the end
     this.turn = Promise.resolve();
     this.underWay = null; // the request that is asked
@@ -37,31 +52,50 @@ class Live {
     this.isMoving = this.isSlow = false;
   }
 
+  // What the address keeps.
+  get state() {
+    const { mode, view, center, zoom, slices, opacity, shade, annotate, theme } = this.look, home = this.home();
+    const unless = (value, first) => String(value) === String(first) ? null : String(value);
+    return {
+      mode: unless(mode, 'mean'), view: unless(view, home.view), center: unless(texts(center), texts(home.center)), zoom: unless(short(zoom), 1),
+      iso: mode === 'iso' ? this.isoShare : null, slices: mode === 'slice' ? slices.map(([axis, share]) => `${axis}:${short(share)}`).join() : null,
+      opacity: opacity?.map(point => point.join(':')).join(), shade: shade ? 1 : null, box: annotate ? null : 0, white: theme ? 1 : null,
+    };
+  }
+
   home() { return { view: [30, 30], center: this.facts.center, zoom: 1 }; }
 
-  // Pixels of a picture at rest: as many as the window has room for.
-  fullSize() {
+  // Pixels of a picture that fills its place on the screen, up to a number along a side.
+  screenSize(mostPixels) {
     const { clientWidth, clientHeight } = element('frame-of-picture'), room = [clientWidth, clientHeight].map(side => Math.max(side, 120));
-    const density = window.devicePixelRatio || 1, most = Math.min(density, FULL_PIXELS / Math.max(...room));
+    const density = window.devicePixelRatio || 1, most = Math.min(density, mostPixels / Math.max(...room));
     return room.map(side => Math.round(side * most));
   }
 
+  fullSize() { return this.screenSize(FULL_PIXELS); }
+
+  // Width and height of a picture, and its level of detail.
+  measures(quality) {
+    if (quality !== COARSE) return { size: quality === SHARP ? this.screenSize(SHARP_PIXELS) : this.fullSize(), lod: 0 };
+    const [pixels, lod] = COARSER[this.coarser[this.look.mode] ?? FIRST], full = this.fullSize(), part = Math.min(1, pixels / Math.max(...full));
+    return { size: full.map(side => Math.max(1, Math.round(side * part))), lod: Math.min(this.facts.coarsest, lod) };
+  }
+
   // The request for the pictures of some frames: fields of a PictureRequest, as the texts of its options.
-  request(frames, isFull, chosen = {}) {
-    const { mode, view, center, zoom, map, range, opacity, slices, iso, shade, annotate, theme } = this.look, full = this.fullSize();
-    const part = isFull ? 1 : Math.min(1, MOVING_PIXELS / Math.max(...full));
-    const size = full.map(side => Math.max(1, Math.round(side * part)));
-    const lod = isFull || mode === 'slice' ? 0 : Math.min(this.facts.coarsest, 1);
-    const isOfErrors = mode === 'error', isComposite = mode === 'composite';
-    const colours = { map, ...this.known[this.colourKey(isFull)], ...(isComposite && range ? { range } : {}), ...chosen };
+  request(frames, quality, chosen = {}) {
+    const { mode, view, center, zoom, map, range, opacity, slices, iso, shade, annotate, theme } = this.look, { size, lod } = this.measures(quality);
+    const isOfErrors = mode === 'error', isComposite = mode === 'composite', known = this.known[this.colourKey(quality)];
+    const automatic = known && (known.isFull || quality === COARSE) ? known : {};
+    const colours = { map, ...automatic, ...(isComposite && range ? { range } : {}), ...chosen };
+    const points = opacity ?? (quality === COARSE && !range ? automatic.opacity : null);
     const look = {
       mode: isOfErrors || mode === 'mean' ? undefined : mode, view: [view.join()], center: texts(center), size: size.join('x'),
       scale: short(zoom * 0.95 * Math.min(...size) / (2 * this.facts.radius)), lod: lod || undefined, frames: frames?.join(':'),
-      shade: isComposite && shade, opacity: isComposite ? opacity?.map(point => point.join(':')).join() : undefined,
+      shade: isComposite && shade, opacity: isComposite ? points?.map(point => point.join(':')).join() : undefined,
       iso: iso.length ? iso.join() : undefined, slice: slices.length ? slices.map(([axis, share]) => `${axis}=${short(100 * share)}%`) : undefined,
       annotate, theme, ...this.coloursOf(mode, colours),
     };
-    return { look, certify: isOfErrors && isFull, packed: this.isSlow };
+    return { look, certify: isOfErrors && quality !== COARSE, packed: this.isSlow };
   }
 
   // The fields of a PictureRequest for colours.
@@ -75,66 +109,120 @@ class Live {
   }
 
   // A key for all pictures that share automatic colours. Slices get the colours of their places as soon as they rest.
-  colourKey(isFull) {
+  colourKey(quality) {
     const { mode, map, slices } = this.look;
     if (mode !== 'slice') return `${mode === 'error' ? 'mean' : mode} ${map ?? ''}`;
     const own = `slice ${JSON.stringify(slices)}`;
-    return isFull || this.known[own] ? own : this.ofSlices ?? own;
+    return quality !== COARSE || this.known[own] ? own : this.ofSlices ?? own;
   }
 
   // A key for all requests that differ only in the frame.
-  key(isFull) {
+  key(quality) {
     const isChosen = this.look.mode === 'composite' && this.look.range;
-    const { look, certify } = this.request(null, isFull);
-    return JSON.stringify({ ...look, ...(isChosen ? {} : { range: null }), clear: null, beyond: null, certify, colours: this.colourKey(isFull) });
+    const { look, certify } = this.request(null, quality);
+    const automatic = { ...(isChosen ? {} : { range: null }), clear: null, beyond: null, ...(this.look.opacity ? {} : { opacity: null }) };
+    return JSON.stringify({ ...look, ...automatic, certify, colours: this.colourKey(quality) });
   }
 
-  // A picture: complete if nothing moves, else a small one.
-  async picture(_, index, isPlaying) {
+  found(quality, index) { return this.kept.get(this.key(quality))?.get(index); }
+
+  // Tells which frames have full pictures.
+  loaded() {
+    const kept = this.kept.get(this.key(FULL));
+    return index => kept?.has(index);
+  }
+
+  // The qualities to ask for, one after another, unless better ones are there already.
+  qualities(isPlaying) {
+    if (this.isMoving) return [COARSE];
+    if (this.look.mode === 'error') return [FULL];
+    if (isPlaying) return [this.pace[this.look.mode] <= SMOOTH ? FULL : COARSE];
+    const isDense = !this.isTooSharp && this.screenSize(SHARP_PIXELS)[0] > DENSER * this.fullSize()[0];
+    return [COARSE, FULL, ...(isDense ? [SHARP] : [])];
+  }
+
+  // The pictures of a frame, the coarse one first.
+  async *pictures(_, index, isPlaying) {
+    const step = Math.sign(index - (this.index ?? index));
     this.index = index;
     clearTimeout(this.filling);
-    for (const wanted = ++this.wanted; ;) {
-      const isFull = !this.isMoving, key = this.key(isFull);
-      const kept = this.kept.get(this.key(true))?.get(index) ?? this.kept.get(key)?.get(index);
-      const frames = isPlaying && isFull ? this.block(index) : [index, index + 1];
+    const wanted = ++this.wanted, qualities = this.qualities(isPlaying);
+    const best = QUALITIES.findLast(quality => quality !== COARSE && this.found(quality, index));
+    if (best) yield this.found(best, index);
+    for (const quality of qualities.filter(quality => QUALITIES.indexOf(quality) > QUALITIES.indexOf(best))) {
+      if (wanted !== this.wanted) return;
+      const picture = await this.wantedPicture(quality, index, isPlaying, wanted).catch(error => this.orNone(error, quality));
+      if (picture && (wanted === this.wanted || this.isMoving)) yield picture;
+      if (quality === COARSE && step && !isPlaying) await this.loadNext(index, step, wanted);
+    }
+    if (wanted !== this.wanted || this.isMoving) return;
+    if (isPlaying) this.playAhead(qualities[0], index);
+    else this.fillLater(index);
+  }
+
+  // Loads coarse pictures of the frames that a user who steps through time sees next.
+  async loadNext(index, step, wanted) {
+    const last = this.sequences[0].pictures.length - 1, [one, other] = [index + step, index + STEPS * step].map(frame => clamped(frame, 0, last));
+    await new Promise(next => setTimeout(next)); // the picture is drawn meanwhile
+    if (wanted === this.wanted && this.underWay?.rank !== PLOT) await this.loadMissing([Math.min(one, other), Math.max(one, other) + 1], COARSE).catch(problem);
+  }
+
+  // Does without sharp pictures from then on if the server lacks memory for one.
+  orNone(error, quality) {
+    if (quality !== SHARP || isPassing(error)) throw error;
+    this.isTooSharp = true;
+    return null;
+  }
+
+  // Asks again if automatic colours were found meanwhile, for they are a part of what is asked for.
+  async wantedPicture(quality, index, isPlaying, wanted) {
+    for (;;) {
+      const frames = isPlaying && !this.isMoving ? this.block(index, quality) : [index, index + 1];
       try {
-        const picture = kept ?? await this.load(key, { frames, isFull, index, rank: USER });
-        if (isFull && wanted === this.wanted) this.fillLater(index);
-        return picture;
+        return this.found(quality, index) ?? await this.load(this.key(quality), { frames, quality, index, rank: USER });
       } catch (error) {
-        if (!(error instanceof Stale) || wanted !== this.wanted) throw error; // else automatic colours were found meanwhile
+        if (!(error instanceof Stale) || wanted !== this.wanted) throw error;
       }
     }
   }
 
+  // Loads the next frames while those before them play.
+  playAhead(quality, index) {
+    const [, next] = this.block(index, quality), last = this.sequences[0].pictures.length;
+    const first = next < last ? next : 0;
+    if (this.found(quality, first) || this.found(FULL, first) || this.underWay) return;
+    this.load(this.key(quality), { frames: this.block(first, quality), quality, index: first, rank: AHEAD }).catch(problem);
+  }
+
   // A complete picture for a plot. Requests for what the user sees come first; then it asks again.
   async whole(_, index, isWanted) {
-    const key = this.key(true);
+    const key = this.key(FULL);
     for (;;) {
       try {
-        return this.kept.get(key)?.get(index) ?? await this.load(key, { frames: this.block(index), isFull: true, index, rank: PLOT });
+        return this.kept.get(key)?.get(index) ?? await this.load(key, { frames: this.block(index, FULL), quality: FULL, index, rank: PLOT });
       } catch (error) {
-        if (!isPassing(error) || !isWanted() || key !== this.key(true)) throw error;
+        if (!isPassing(error) || !isWanted() || key !== this.key(FULL)) throw error;
         await pause(REST);
       }
     }
   }
 
   // The frames to ask for together, around one.
-  block(index) {
-    const { mode } = this.look, [width, height] = this.fullSize();
+  block(index, quality) {
+    const { mode } = this.look, [width, height] = this.measures(quality).size;
     if (mode === 'error') return [index, index + 1]; // errors take long
-    const numbers = mode === 'composite' || mode === 'iso' || this.kind === 'channels' ? 4 : 1;
-    const count = Math.min(Math.max(Math.floor(BLOCK_NUMBERS / (width * height * numbers)), 1), BLOCK_FRAMES);
-    const first = index - index % count;
+    const each = mode === 'composite' || mode === 'iso' || this.kind === 'channels' ? 4 : 1;
+    const fit = Math.floor(this.facts.numbers / (width * height * each)), inTime = Math.floor(BLOCK_TIME / (this.pace[mode] ?? BLOCK_TIME));
+    const count = clamped(Math.min(fit, quality === COARSE ? COARSE_FRAMES : inTime), 1, BLOCK_FRAMES), first = index - index % count;
     return [first, Math.min(first + count, this.sequences[0].pictures.length)];
   }
 
   // Loads pictures in turn. Stops a running request that does not help, and never sends one that is no longer wanted.
-  async load(key, { frames, isFull, index, rank }) {
+  async load(key, { frames, quality, index, rank }) {
     const { underWay, turn: before } = this, isOfUser = rank === USER;
     const isHelp = underWay?.key === key && underWay.frames[0] <= index && index < underWay.frames[1];
-    if (underWay?.isFull && !isHelp && (isOfUser || rank === AHEAD && underWay.rank === AHEAD)) underWay.stop.abort();
+    const isStopped = underWay && (underWay.quality !== COARSE || underWay.rank === AHEAD) && !isHelp;
+    if (isStopped && (isOfUser || rank === AHEAD && underWay.rank === AHEAD)) underWay.stop.abort();
     const { wanted } = this;
     let done;
     this.turn = new Promise(resolve => { done = resolve; });
@@ -143,20 +231,21 @@ class Live {
       await before.finally(() => { this.waiting -= isOfUser; });
       const kept = this.kept.get(key)?.get(index);
       if (kept) return kept;
-      if (key !== this.key(isFull) || (isOfUser ? wanted !== this.wanted : this.waiting > 0)) throw new Stale();
-      this.underWay = { key, frames, isFull, rank, stop: new AbortController() };
-      return (await this.ask(key, frames, isFull)).get(index);
+      if (key !== this.key(quality) || (isOfUser ? wanted !== this.wanted : this.waiting > 0)) throw new Stale();
+      this.underWay = { key, frames, quality, rank, stop: new AbortController() };
+      return (await this.ask(key, frames, quality)).get(index);
     } finally {
       this.underWay = null;
       done();
     }
   }
 
-  async ask(key, frames, isFull) {
-    const { mode, range } = this.look, colours = this.colourKey(isFull), isChosen = mode === 'composite' && range;
-    const answer = await this.post('pictures', this.request(frames, isFull), this.underWay.stop.signal);
-    const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer());
-    if (bytes.length > 2 ** 20 && bytes.length / (performance.now() - started) * 1000 < SLOW) this.isSlow = true;
+  async ask(key, frames, quality) {
+    const { mode, range } = this.look, colours = this.colourKey(quality), isChosen = mode === 'composite' && range, begun = performance.now();
+    const answer = await this.post('pictures', this.request(frames, quality), this.underWay.stop.signal, this.underWay.rank);
+    const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer()), ended = performance.now();
+    if (bytes.length > 2 ** 20 && bytes.length / (ended - started) * 1000 < SLOW) this.isSlow = true;
+    this.learnPace(mode, quality, (ended - begun) / (frames[1] - frames[0]), frames);
     const length = new DataView(bytes.buffer).getUint32(0, true);
     const { about, blocks, errors, opacity } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
     this.kind = about.kind;
@@ -165,16 +254,35 @@ class Live {
     Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, hasBar: mode === 'composite', opacity });
     about.mode = mode === 'error' && !errors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
-    if (!isChosen) this.known[colours] ??= { range: about.range, clear: about.kind === 'value' ? about.clear?.slice(0, 2) ?? [] : null, beyond: about.rays[0] ? about.beyond : null };
+    if (!isChosen) this.learnColours(colours, about, quality);
     const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;
     const shares = about.rays[0] && sharesOf(about.rays[0], about.size);
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
       const { pictures } = await readBlock(bytes.subarray(at, at += size));
-      pictures.forEach((planes, n) => kept.set(frames[0] + first + n, { planes, about, backdrop, shares }));
+      pictures.forEach((planes, n) => kept.set(frames[0] + first + n, { planes, about, backdrop, shares, quality }));
     }
     if (errors) this.showErrors(kept, frames[0], (await readBlock(bytes.subarray(at, at + errors))).pictures);
     return kept;
+  }
+
+  // Keeps the automatic colours of the first full answer of a mode, and those of a coarse one until then.
+  learnColours(colours, about, quality) {
+    const isFull = quality !== COARSE, before = this.known[colours];
+    if (before && (before.isFull || !isFull)) return;
+    if (before) this.kept.forEach((pictures, key) => { if (pictures.values().next().value?.quality === COARSE) this.kept.delete(key); });
+    const isOfValues = about.kind === 'value', opacity = isFull && about.opacity ? simplified(about.opacity) : null;
+    this.known[colours] = { range: about.range, clear: isOfValues ? about.clear?.slice(0, 2) ?? [] : null, beyond: about.rays[0] ? about.beyond : null, opacity, isFull };
+  }
+
+  // Learns how long pictures of a mode take: coarse ones become coarser if they are late.
+  learnPace(mode, quality, milliseconds, [first, end]) {
+    if (quality === FULL) this.pace[mode] = milliseconds;
+    if (quality !== COARSE || end - first > 1) return;
+    const n = this.coarser[mode] ?? FIRST, two = [milliseconds, this.lastPace[mode] ?? (SOON + LATE) / 2];
+    const by = Math.min(...two) > LATE ? 1 : Math.max(...two) < SOON ? -1 : 0;
+    this.coarser[mode] = clamped(n + by, 0, COARSER.length - 1);
+    this.lastPace[mode] = by ? undefined : milliseconds;
   }
 
   // Puts the errors of pixels in front of their values.
@@ -192,7 +300,10 @@ class Live {
     const kept = this.kept.get(key) ?? new Map();
     this.kept.delete(key);
     this.kept.set(key, kept);
-    const bytes = pictures => [...pictures.values()].reduce((sum, { planes }) => sum + planes.length * planes[0].byteLength, 0);
+    const bytes = pictures => {
+      const all = [...pictures.values()], parts = new Set(all.flatMap(({ planes, beneath, shares, backdrop }) => [...planes, beneath, shares, backdrop]));
+      return [...parts].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
+    };
     let all = [...this.kept.values()].reduce((sum, pictures) => sum + bytes(pictures), 0);
     for (const [oldest, pictures] of this.kept) {
       if (all <= KEPT_BYTES || oldest === key) break;
@@ -203,20 +314,27 @@ class Live {
     return kept;
   }
 
-  // Asks for the frames around a picture, and for those behind them, unless something else is wanted.
+  // Asks for pictures beside one that is shown, unless something else is wanted.
   fillLater(index) {
     clearTimeout(this.filling);
-    this.filling = setTimeout(() => this.fill(index).catch(problem), REST);
+    this.filling = setTimeout(() => this.fill(index).catch(problem), IDLE);
   }
 
+  // Loads coarse pictures of the frames beside, and then full ones of the frames around and behind.
   async fill(index) {
-    const key = this.key(true), around = this.block(index), last = this.sequences[0].pictures.length;
-    for (const frames of [around, ...(around[1] < last ? [this.block(around[1])] : [])]) {
-      let missing = frames[0];
-      while (missing < frames[1] && this.kept.get(key)?.has(missing)) missing++;
-      if (missing < frames[1]) await this.load(key, { frames, isFull: true, index: missing, rank: AHEAD });
-    }
+    const last = this.sequences[0].pictures.length, around = this.block(index, FULL);
+    const beside = [clamped(index - 2, 0, last - 1), clamped(index + 4, 1, last)];
+    if (this.look.mode !== 'error') await this.loadMissing(beside, COARSE);
+    for (const frames of [around, ...(around[1] < last ? [this.block(around[1], FULL)] : [])]) await this.loadMissing(frames, FULL);
     document.documentElement.dataset.filled = index;
+    this.filled();
+  }
+
+  // Loads the pictures of some frames from the first one on that is not there.
+  async loadMissing([first, end], quality) {
+    let missing = first;
+    while (missing < end && (this.found(quality, missing) || quality === COARSE && this.found(FULL, missing))) missing++;
+    if (missing < end) await this.load(this.key(quality), { frames: [missing, end], quality, index: missing, rank: AHEAD });
   }
 
   // Stops loading pictures ahead of the user.
@@ -225,7 +343,12 @@ class Live {
     if (this.underWay?.rank === AHEAD) this.underWay.stop.abort();
   }
 
-  // Changes what is seen. While something moves, pictures are small.
+  // Nothing moves any more.
+  rest() {
+    if (this.isMoving) this.change({}, false);
+  }
+
+  // Changes what is seen. While something moves, pictures are coarse.
   change(changes, isMoving) {
     const isOther = name => name in changes && JSON.stringify(changes[name]) !== JSON.stringify(this.look[name]);
     if (!Object.keys(changes).length || ['mode', 'view', 'center', 'zoom', 'slices'].some(isOther)) this.moved();
@@ -238,17 +361,20 @@ class Live {
     this.changed();
   }
 
-  // Asks the server, again and again until it answers. Shows its progress while it works.
-  async post(where, request, signal) {
+  // Asks the server, again and again until it answers. Shows its progress while the user waits.
+  async post(where, request, signal, rank = USER) {
+    const what = where.startsWith('save') ? 'making the file' : request.certify ? 'bounding the errors' : 'drawing';
+    let isDone = false;
     const working = setInterval(async () => {
-      const share = await fetch('progress').then(answer => answer.text()).catch(() => '');
-      if (share) say('status', `rendering, ${Math.round(100 * share)} %`);
+      const share = rank === USER && await fetch('progress').then(answer => answer.text()).catch(() => '');
+      if (share && !isDone) say('status', `${what}, ${Math.round(100 * share)} %`);
     }, PATIENCE);
     try {
       const answer = await this.patiently(where, { method: 'POST', body: JSON.stringify(request), signal });
       if (!answer.ok) throw new Error(await answer.text() || answer.statusText);
       return answer;
     } finally {
+      isDone = true;
       clearInterval(working);
       setTimeout(() => say('status', ''));
     }
@@ -270,6 +396,6 @@ class Live {
   async made(where, file) {
     const frames = file.endsWith('.png') ? [this.index, this.index + 1] : [0, this.sequences[0].pictures.length];
     const certify = where === 'command' && this.look.mode === 'error';
-    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, true, this.colours()), certify });
+    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, FULL, this.colours()), certify });
   }
 }

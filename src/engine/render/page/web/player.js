@@ -1,7 +1,8 @@
-// Shows the pictures of a source: the time slider, the colours, and what lies under the pointer.
+// Shows the pictures of a source: their colours, what lies under the pointer, and plots over time.
 //
 // A source has `sequences`, lists of pictures with their view and frame; `about`, a first description of them; and
-// `picture(sequence, index)`, which promises the planes of a picture, its own description, and the RGBA bytes behind it.
+// `pictures(sequence, index, isPlaying)`, which gives a picture again and again, the coarsest first: its planes, its own description, and
+// the RGBA bytes behind it.
 
 const element = id => document.getElementById(id);
 
@@ -20,8 +21,8 @@ function say(id, text) {
 
 // Whether a key is for the control that has the focus.
 function isForControl({ key, target, ctrlKey, metaKey, altKey }) {
-  if (ctrlKey || metaKey || altKey) return true;
-  if (target.matches('input[type="range"]')) return /^(Arrow|Page|Home$|End$)/.test(key);
+  if (ctrlKey || metaKey || altKey || element('text-dialog').open) return true;
+  if (target.matches('input[type="range"], input[type="radio"], [role="slider"]')) return /^(Arrow|Page|Home$|End$)/.test(key);
   return target.matches('input, select, textarea') || (target.matches('button, summary') && [' ', 'Enter'].includes(key));
 }
 
@@ -32,14 +33,39 @@ class Player {
     this.sequence = 0;
     this.index = source.opening;
     this.shown = null;
-    this.isPlaying = false;
     this.context = element('picture').getContext('2d');
+    this.bar = new Bar((range, isMoving) => this.setRange(range, isMoving));
+    this.time = new TimeLine(this);
     element('sequence').replaceChildren(...source.sequences.map(({ label }, n) => new Option(label, n)));
     element('views').hidden = source.sequences.length < 2;
+    this.restore();
     this.adopt(source.about);
     this.beginTime();
     this.listen();
-    this.show();
+    this.fold(window.matchMedia('(max-width: 50rem)').matches);
+    element('link').hidden = location.protocol === 'about:'; // a page within another has no address
+  }
+
+  // Takes up the state of the address.
+  restore() {
+    const { mode, sequence, frame, map, range, log, gamma } = Address.read(), { maps, mode: first } = this.source.about;
+    this.sequence = clamped(natural(sequence) ?? 0, 0, this.source.sequences.length - 1);
+    const index = this.pictures.findIndex(picture => picture.frame === natural(frame));
+    if (index >= 0) this.index = index;
+    if (Object.hasOwn(maps, map ?? '')) this.chosen.map = map;
+    const ends = numbersIn(range, 2), [bent] = numbersIn(gamma, 1) ?? [];
+    this.chosen[`of ${mode ?? this.source.look?.mode ?? first}`] = {
+      ...(ends && ends[0] < ends[1] ? { range: ends } : {}), ...(log ? { isLog: log === '1' } : {}), ...(bent ? { gamma: clamped(bent, -1, 1) } : {}),
+    };
+  }
+
+  // What the address keeps.
+  get state() {
+    const { range, isLog, gamma } = this.chosen[`of ${this.source.look?.mode ?? this.about.mode}`] ?? {}, { frame } = this.pictures[this.index];
+    return {
+      frame, sequence: this.sequence || null, map: this.chosen.map, range: range?.join() ?? null, log: isLog === undefined ? null : Number(isLog),
+      gamma: Number(gamma) || null,
+    };
   }
 
   get pictures() { return this.source.sequences[this.sequence].pictures; }
@@ -52,6 +78,7 @@ class Player {
     document.title = element('title').textContent = about.title || about.values || 'wavesplat';
     element('provenance').textContent = JSON.stringify(about.settings, null, 1);
     const picture = element('picture');
+    picture.ariaLabel = `${about.mode || 'picture'} of ${about.values || about.title || 'values'}`;
     if (picture.width !== about.size[0] || picture.height !== about.size[1] || !this.image) {
       [picture.width, picture.height] = about.size;
       this.image = this.context.createImageData(...about.size);
@@ -64,8 +91,9 @@ class Player {
 
   beginColours() {
     const { about } = this, isOfValues = about.kind === 'value';
-    element('bar').style.visibility = isOfValues || about.hasBar ? 'visible' : 'hidden';
+    if (!this.source.look) element('bar').hidden = !isOfValues && !about.hasBar; // a live page hides it as soon as a mode is chosen
     element('colours').hidden = !isOfValues && about.mode !== 'composite';
+    element('bar').classList.toggle('fixed', element('colours').hidden);
     element('log-control').hidden = element('gamma-control').hidden = !isOfValues;
     element('map').replaceChildren(...Object.keys(about.maps).map(name => new Option(name)));
     element('bar-name').textContent = about.values;
@@ -80,8 +108,10 @@ class Player {
 
   // The range: as chosen, or that of the pictures, with 0 in the middle of a map that diverges from it.
   takeColours() {
-    const { about, range: before } = this, map = element('map').value;
-    this.range = this.ownColours.range ?? (map === about.map ? about.range : suitable(about.range, map));
+    const { about, range: before } = this, map = element('map').value, { range } = this.ownColours;
+    const automatic = map === about.map ? about.range : suitable(about.range, map);
+    if (about.kind === 'value' || !range) this.ownColours.automatic = automatic;
+    this.range = range ?? automatic;
     if (this.range.some((end, n) => end !== before?.[n])) this.showRange(); // else what is typed stays
     this.recolour();
   }
@@ -103,31 +133,44 @@ class Player {
     this.beginColours();
     this.takeColours();
     this.showRange();
+    this.keep();
   }
 
   chooseMap() {
     this.chosen.map = element('map').value;
     this.takeColours();
+    this.keep();
+  }
+
+  // Keeps the state in the address.
+  keep() {
+    Address.write({ ...this.state, ...this.source.state });
+  }
+
+  // Folds the controls away, or back.
+  fold(isFolded = !document.documentElement.classList.contains('folded')) {
+    document.documentElement.classList.toggle('folded', isFolded);
+    element('fold').ariaExpanded = !isFolded;
   }
 
   beginTime() {
-    const last = this.pictures.length - 1;
-    element('frame').max = last;
-    element('time').style.visibility = last ? 'visible' : 'hidden';
-    this.index = Math.min(this.index, last);
+    this.index = Math.min(this.index, this.pictures.length - 1);
+    element('sequence').value = this.sequence;
+    this.time.begin();
   }
 
   listen() {
     const on = (id, event, action) => element(id).addEventListener(event, action);
-    on('play', 'click', () => this.play(!this.isPlaying));
-    on('frame', 'input', () => this.show(Number(element('frame').value)));
     on('sequence', 'change', () => this.choose(Number(element('sequence').value)));
     on('map', 'input', () => this.chooseMap());
-    on('log', 'input', () => { this.ownColours.isLog = element('log').checked; this.recolour(); });
-    on('gamma', 'input', () => { this.ownColours.gamma = element('gamma').value; this.recolour(); });
+    on('log', 'input', () => { this.ownColours.isLog = element('log').checked; this.recolour(); this.keep(); });
+    on('gamma', 'input', () => { this.ownColours.gamma = element('gamma').value; this.recolour(); this.keep(); });
     for (const id of ['low', 'high']) on(id, 'change', () => this.chooseRange());
     on('reset', 'click', () => { this.resetColours(); this.source.reset?.(); });
     on('save', 'click', () => this.save());
+    on('link', 'click', () => offer('Link to this page', Address.link()));
+    on('fold', 'click', () => this.fold());
+    on('close-series', 'click', () => this.clearSeries());
     on('picture', 'pointermove', event => this.read(event));
     on('picture', 'pointerleave', () => { this.pointer = null; say('readout', ''); });
     on('picture', 'click', event => this.click(event));
@@ -138,11 +181,12 @@ class Player {
     if (isForControl(event)) return;
     const last = this.pictures.length - 1;
     const actions = {
-      ' ': () => event.repeat || this.play(!this.isPlaying),
+      ' ': () => event.repeat || this.time.play(!this.time.isPlaying),
       ArrowRight: () => this.show(Math.min(this.index + 1, last)),
       ArrowLeft: () => this.show(Math.max(this.index - 1, 0)),
       Home: () => this.show(0),
       End: () => this.show(last),
+      c: () => this.fold(),
       v: () => this.choose((this.sequence + 1) % this.source.sequences.length),
     };
     if (!actions[event.key]) return;
@@ -152,7 +196,6 @@ class Player {
 
   choose(sequence) {
     this.sequence = sequence;
-    element('sequence').value = sequence;
     this.clearSeries();
     this.beginTime();
     this.show();
@@ -164,10 +207,16 @@ class Player {
     ends.filter(end => !Number.isFinite(end.valueAsNumber)).forEach(end => { end.value = shortNumber(this.range[ends.indexOf(end)]); });
     const range = ends.map(number);
     if (range[0] >= range[1]) return this.markRange('From must be below To: change the other one as well.');
+    this.setRange(range, false);
+  }
+
+  // Takes a range. While it moves, more of them follow.
+  setRange(range, isMoving) {
     this.ownColours.range = range;
     this.takeColours();
     this.showRange();
-    this.source.ranged?.(range);
+    this.source.ranged?.(range, isMoving);
+    if (!isMoving) this.keep();
   }
 
   // Makes the colours anew, and draws with them.
@@ -188,18 +237,9 @@ class Player {
   }
 
   drawBar() {
-    const bar = element('bar-colours'), context = bar.getContext('2d'), image = context.createImageData(1, bar.height);
-    const values = Float32Array.from({ length: bar.height }, (_, i) => this.scale.value(1 - i / (bar.height - 1)));
-    image.data.fill(255);
-    paint([values], 'value', this.scale, this.plainBackground(bar.height), image.data);
-    context.putImageData(image, 0, 0);
-    const tick = value => {
-      const span = document.createElement('span');
-      span.textContent = shortNumber(value);
-      span.style.top = `${100 * (1 - this.scale.share(value))}%`;
-      return span;
-    };
-    element('bar-ticks').replaceChildren(...ticks(this.scale).map(tick));
+    this.bar.show(this.scale, this.ownColours.automatic ?? this.range, (values, pixels) => {
+      paint([values], 'value', this.scale, this.plainBackground(values.length), pixels);
+    });
   }
 
   plainBackground(pixels) {
@@ -208,18 +248,26 @@ class Player {
     return rgba;
   }
 
-  // Shows a picture as soon as it is there. Only the last request counts.
+  // Shows a frame: what is there at once, and then better pictures of it. Only the last request counts.
   async show(index = this.index) {
     this.index = index;
-    element('frame').value = index;
-    const asked = [this.sequence, index], { frame } = this.pictures[index];
-    element('label').textContent = this.about.labels[frame] ?? `frame ${frame}`;
-    const shown = await this.source.picture(...asked, this.isPlaying).catch(problem);
-    if (!shown || asked[0] !== this.sequence || asked[1] !== this.index) return;
+    const asked = [this.sequence, index], isAsked = () => asked[0] === this.sequence && asked[1] === this.index;
+    this.time.follow(index);
+    this.keep();
+    try {
+      for await (const shown of this.source.pictures(...asked, this.time.isPlaying)) {
+        if (!isAsked()) return;
+        this.take(shown);
+      }
+    } catch (error) { problem(error); }
+  }
+
+  take(shown) {
     this.shown = shown;
     if (shown.about === this.about) this.draw();
     else this.adopt(shown.about);
     this.source.drawn?.(shown);
+    this.time.showLoaded(this.source.loaded());
     if (this.pointer) this.read(this.pointer);
     if (this.series) this.drawSeries(this.series.values, this.series.name);
   }
@@ -230,25 +278,8 @@ class Player {
     const painted = about.kind === 'value' && !this.scale.log ? [weighed(planes[0], shares, about.beyond)] : planes;
     paint(painted, about.kind, this.scale, backdrop ?? this.plainBackground(planes[0].length), this.image.data);
     this.context.putImageData(this.image, 0, 0);
+    if (about.kind === 'value') this.bar.counts = countsOf(painted[0], this.bar.domain);
     document.documentElement.dataset.drawn = `${this.sequence}:${this.index}`;
-  }
-
-  play(isPlaying) {
-    this.isPlaying = isPlaying;
-    element('play').textContent = isPlaying ? 'Pause' : 'Play';
-    if (isPlaying) this.run();
-  }
-
-  // Shows one picture after another, each only after the one before it has loaded.
-  async run() {
-    let due = performance.now();
-    while (this.isPlaying) {
-      const last = this.pictures.length - 1;
-      if (this.index === last && !element('loop').checked) return this.play(false);
-      await this.show(this.index === last ? 0 : this.index + 1);
-      due = Math.max(due + 1000 / (this.about.fps * element('speed').value), performance.now());
-      await new Promise(next => setTimeout(next, due - performance.now()));
-    }
   }
 
   // The pixel under the pointer, in a picture of this size.
@@ -315,9 +346,32 @@ class Player {
     element('series').hidden = false;
   }
 
+  // Saves the picture with its colours and time.
   save() {
     const frame = String(this.pictures[this.index].frame).padStart(4, '0');
-    element('picture').toBlob(blob => download(blob, `picture_${frame}.png`));
+    this.withLegend().toBlob(blob => download(blob, `picture_${frame}.png`));
+  }
+
+  // The picture, and below it its name, its time, and the colours of its values.
+  withLegend() {
+    const picture = element('picture'), { width, height } = picture, line = Math.max(14, Math.round(0.025 * Math.min(width, height)));
+    const canvas = document.createElement('canvas'), context = canvas.getContext('2d'), hasBar = !element('bar').hidden;
+    [canvas.width, canvas.height] = [width, height + (hasBar ? 5 : 2) * line];
+    const style = getComputedStyle(document.documentElement);
+    context.fillStyle = `rgb(${this.about.background.join()})`;
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.drawImage(picture, 0, 0);
+    context.font = `${line}px system-ui, sans-serif`;
+    context.fillStyle = style.getPropertyValue('--ink');
+    const write = (text, x, y, align) => { context.textAlign = align; context.fillText(text, x, y, width - 2 * line); };
+    write(this.about.values || element('title').textContent, line, height + 1.2 * line, 'left');
+    if (this.pictures.length > 1) write(element('label').textContent, width - line, height + 1.2 * line, 'right');
+    if (!hasBar) return canvas;
+    const room = width - 4 * line;
+    context.imageSmoothingEnabled = false;
+    context.drawImage(element('bar-colours'), 2 * line, height + 2 * line, room, line);
+    for (const mark of element('bar-ticks').children) write(mark.textContent, 2 * line + parseFloat(mark.style.left) / 100 * room, height + 4.2 * line, 'center');
+    return canvas;
   }
 }
 
@@ -327,6 +381,19 @@ function download(blob, name) {
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+// Copies a text, or shows it where a page may not copy.
+async function offer(name, text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    say('readout', `Copied: ${text}`);
+  } catch {
+    say('text-name', name);
+    element('text').value = text;
+    element('text-dialog').showModal();
+    element('text').select();
+  }
 }
 
 // Whether an error means only that another request came first.

@@ -1,6 +1,18 @@
 // The user's control of the camera and the scene of a live page.
 
 const AXES = ['x', 'y', 'z'];
+const HELP = ['Drag turns, shift-drag moves, the wheel zooms, a double click resets. W A S D turn, + and - zoom, space plays, arrows step.', 'A finger turns, two zoom and move, a double tap resets.'];
+
+// How common samples are, of some frames or of one; nothing if the server does not say.
+async function howCommon(of = {}) {
+  const answer = await fetch(`histogram?${new URLSearchParams(of)}`).catch(() => null);
+  return answer?.ok ? answer.json().catch(() => null) : null;
+}
+
+// Pairs in a text like "a:1,b:2".
+const pairs = text => (text ?? '').split(',').map(pair => pair.split(':')).filter(pair => pair.length === 2);
+
+const ZOOM = [0.05, 500];
 
 // What a click does in each mode.
 const CLICKS = {
@@ -18,7 +30,8 @@ class Steering {
       moved: () => player.clearSeries(),
       drawn: shown => this.follow(shown),
       colours: () => this.colours(),
-      ranged: range => { if (this.live.look.mode === 'composite') this.live.change({ range }, false); },
+      ranged: (range, isMoving) => { if (player.about.mode === 'composite' && this.live.look.mode === 'composite') this.live.change({ range }, isMoving); },
+      filled: () => player.time.showLoaded(this.live.loaded()),
       reset: () => { if (this.live.look.mode === 'composite') this.choose(false); },
       wasDragged: () => this.dragged > 4,
       place: event => this.place(event),
@@ -27,26 +40,55 @@ class Steering {
     this.pointers = new Map();
     this.listenToPicture();
     this.listenToControls();
+    this.restore();
+    this.choose(false);
+  }
+
+  // Takes up the state of the address.
+  restore() {
+    const { mode, view, center, zoom, iso, slices, opacity, shade, box, white } = Address.read(), share = text => clamped(Number(text) || 0, 0, 1);
+    this.mode = mode;
+    const [angles, middle, [factor] = [], [place] = []] = [numbersIn(view, 2), numbersIn(center, 3), numbersIn(zoom, 1) ?? [], numbersIn(iso, 1) ?? []];
+    if (angles) this.live.look.view = turned(angles, [0, 0], 1);
+    if (middle) this.live.look.center = middle;
+    if (factor > 0) this.live.look.zoom = clamped(factor, ...ZOOM);
+    if (place !== undefined) [element('iso').value, this.isIsoChosen] = [share(place), true];
+    const chosen = pairs(slices).filter(([axis]) => AXES.includes(axis));
+    if (chosen.length) AXES.forEach(axis => { element(`slice-${axis}`).checked = false; });
+    for (const [axis, at] of chosen) [element(`slice-${axis}`).checked, element(`place-${axis}`).value] = [true, share(at)];
+    const points = pairs(opacity).map(point => point.map(Number)).filter(point => point.every(n => n >= 0 && n <= 1));
+    const isInOrder = points.every(([at], n) => n === 0 ? at === 0 : at > points[n - 1][0]) && points.at(-1)?.[0] === 1;
+    if (isInOrder && points.length <= MOST_POINTS) this.live.look.opacity = points;
+    [element('shade').checked, element('around').checked, element('white').checked] = [shade === '1', box !== '0', white === '1'];
+  }
+
+  // The mode that is chosen.
+  get mode() { return document.querySelector('[name="mode"]:checked').value; }
+
+  set mode(mode) {
+    const tile = Array.from(document.querySelectorAll('[name="mode"]')).find(tile => tile.value === mode);
+    if (tile) tile.checked = true;
   }
 
   listenToPicture() {
     const picture = element('picture'), on = (event, action) => picture.addEventListener(event, action, { passive: false });
     on('pointerdown', event => { this.pointers.set(event.pointerId, event); picture.setPointerCapture(event.pointerId); this.dragged = 0; });
     on('pointermove', event => this.drag(event));
-    for (const end of ['pointerup', 'pointercancel']) on(end, event => this.pointers.delete(event.pointerId));
+    for (const end of ['pointerup', 'pointercancel']) on(end, event => { this.pointers.delete(event.pointerId); if (!this.pointers.size) this.live.rest(); });
     on('wheel', event => { event.preventDefault(); this.zoom(1.0015 ** -event.deltaY, event); });
     on('dblclick', () => this.live.change(this.live.home(), false));
     on('contextmenu', event => event.preventDefault());
     document.addEventListener('keydown', event => this.key(event));
-    this.size = String(this.live.fullSize());
+    this.size = this.sizes;
     new ResizeObserver(() => this.resize()).observe(element('frame-of-picture'));
   }
 
+  get sizes() { return `${this.live.fullSize()} ${this.live.screenSize(SHARP_PIXELS)}`; }
+
   // Asks for pictures that fill their place.
   resize() {
-    const size = String(this.live.fullSize());
-    if (size === this.size) return;
-    this.size = size;
+    if (this.sizes === this.size) return;
+    this.size = this.sizes;
     this.live.change({}, false);
   }
 
@@ -111,17 +153,19 @@ class Steering {
     this.live.change(isMove ? { center: moved() } : { view: turned(view, by, height) }, true);
   }
 
-  // Two fingers zoom by the change of their distance.
+  // Two fingers zoom by the change of their distance, and move by that of their middle.
   pinch(event, before) {
     const other = [...this.pointers.values()].find(pointer => pointer.pointerId !== event.pointerId);
     const apart = ({ clientX, clientY }) => Math.hypot(clientX - other.clientX, clientY - other.clientY);
+    const { center, view } = this.live.look, by = [before.clientX - event.clientX, event.clientY - before.clientY];
+    this.live.look.center = beside(center, view, by.map(pixels => pixels / 2 * this.unit()));
     this.zoom(apart(event) / Math.max(apart(before), 1), { clientX: (event.clientX + other.clientX) / 2, clientY: (event.clientY + other.clientY) / 2 });
   }
 
   // Zooms so that what is under the pointer stays there.
   zoom(factor, { clientX, clientY }) {
     const { zoom, center, view } = this.live.look, box = element('picture').getBoundingClientRect();
-    const next = Math.min(Math.max(zoom * factor, 0.05), 500), unit = this.unit(), part = 1 - zoom / next;
+    const next = clamped(zoom * factor, ...ZOOM), unit = this.unit(), part = 1 - zoom / next;
     const away = [clientX - box.left - box.width / 2, box.top + box.height / 2 - clientY];
     this.live.change({ zoom: next, center: beside(center, view, away.map(pixels => pixels * unit * part)) }, true);
   }
@@ -142,20 +186,22 @@ class Steering {
     element('side').replaceChildren(...Object.keys(SIDES).map(name => new Option(name)));
     on('side', 'change', () => this.live.change({ view: SIDES[element('side').value] ?? this.live.look.view }, false));
     this.showSide();
-    for (const id of ['mode', 'shade', 'around', 'white']) on(id, 'change', () => this.choose(false));
+    for (const tile of document.querySelectorAll('[name="mode"]')) tile.addEventListener('change', () => this.choose(false));
+    for (const id of ['shade', 'around', 'white']) on(id, 'change', () => this.choose(false));
     for (const [n, axis] of AXES.entries()) {
       say(`name-${axis}`, this.live.facts.axes[n].name);
       element(`place-${axis}`).ariaLabel = `place along ${this.live.facts.axes[n].name}`;
       on(`slice-${axis}`, 'change', () => this.choose(false));
       on(`place-${axis}`, 'input', () => { element(`slice-${axis}`).checked = true; this.choose(true); });
     }
-    on('iso', 'input', () => this.choose(true));
-    on('map', 'input', () => { if (element('mode').value === 'composite') this.choose(false); });
+    on('iso', 'input', () => { this.isIsoChosen = true; this.choose(true); });
+    on('map', 'input', () => { if (this.mode === 'composite') this.choose(false); });
     on('copy', 'click', () => this.copy());
     on('save-page', 'click', () => this.save('page.html'));
     on('save-movie', 'click', () => this.save('movie.mp4'));
-    this.opacity = new OpacityEditor(points => this.live.change({ opacity: points }, true));
-    this.showControls('mean');
+    on('opacity-auto', 'click', () => this.live.change({ opacity: null }, false));
+    this.player.bar.opaque = points => this.live.change({ opacity: points }, true);
+    say('help', HELP[Number(window.matchMedia('(pointer: coarse)').matches)]);
   }
 
   // Names the side that is seen, if it has a name.
@@ -168,7 +214,10 @@ class Steering {
   showControls(mode) {
     element('iso-control').hidden = mode !== 'iso';
     element('slice-control').hidden = mode !== 'slice';
-    element('shade-control').hidden = element('opacity-editor').hidden = mode !== 'composite';
+    element('opacity-control').hidden = mode !== 'composite';
+    element('bar').classList.toggle('open', mode === 'composite');
+    element('bar').hidden = mode === 'iso';
+    this.size = this.sizes; // the picture has another place now, for which it is asked anyway
     say('help-click', this.player.pictures.length > 1 ? CLICKS[mode] ?? '' : '');
     const ticked = AXES.filter(axis => element(`slice-${axis}`).checked);
     for (const [n, axis] of AXES.entries()) {
@@ -181,21 +230,39 @@ class Steering {
       element(id).disabled = mode === 'error';
       element(id).title = mode === 'error' ? `A ${id.slice(5)} would show the mean and not its error: save the picture` : `Save all frames of this view as a ${what}`;
     }
-    if (mode === 'composite') this.opacity.open();
   }
 
-  // Follows the picture that is drawn.
-  follow({ about, planes }) {
+  // Follows the picture that is drawn. Until one of the chosen mode is there, the old one is dim.
+  follow({ about, planes, quality }) {
+    const { look } = this.live, { bar } = this.player, isOld = about.mode !== look.mode && (look.mode !== 'error' || quality === COARSE);
+    document.documentElement.classList.toggle('old', isOld);
     element('iso-note').hidden = about.mode !== 'iso' || planes[3].some(opacity => opacity > 0.01);
-    if (about.mode === 'composite') this.opacity.follow(this.live.look.opacity ? null : about.opacity, about.range);
+    if (isOld) return;
+    if (about.kind === 'channels') element('bar').hidden = true;
+    if (about.mode !== 'composite') return bar.follow(null);
+    if (look.opacity) bar.follow(look.opacity, false);
+    else if (quality !== COARSE || !bar.points) bar.follow(about.opacity, true);
+    if (quality !== COARSE) this.showHowCommon();
+  }
+
+  // Shows how common the samples are behind their opacities.
+  async showHowCommon() {
+    const { bar } = this.player;
+    this.common ??= howCommon();
+    const common = await this.common;
+    if (!common?.range || this.mode !== 'composite') return;
+    bar.counts = countsOver(bar.domain, common);
+    bar.drawPlot();
   }
 
   // Shows what the controls say.
   async choose(isMoving) {
-    const mode = element('mode').value;
+    const { mode } = this;
     this.showControls(mode);
+    document.documentElement.classList.toggle('old', mode !== this.player.about.mode);
+    if (this.common && !await this.common) this.common = null; // asks again
     if (mode === 'iso') await (this.isoRange ??= this.beginIso());
-    if (element('mode').value !== mode) return;
+    if (this.mode !== mode) return;
     const slices = AXES.filter(axis => element(`slice-${axis}`).checked).map(axis => [axis, element(`place-${axis}`).valueAsNumber]);
     const changes = { mode, iso: mode === 'iso' ? [await this.iso()] : [], slices: mode === 'slice' ? slices : [], shade: element('shade').checked };
     const isComposite = mode === 'composite', { chosen } = this.player, { maps } = this.live.facts;
@@ -205,18 +272,19 @@ class Steering {
 
   // The value of the isosurface.
   async iso() {
-    const [low, high] = await this.isoRange, iso = Number((low + element('iso').valueAsNumber * (high - low)).toPrecision(4));
-    element('iso-value').textContent = shortNumber(iso);
+    const [low, high] = await this.isoRange, iso = rounded(low + element('iso').valueAsNumber * (high - low), high - low);
+    say('iso-value', shortNumber(iso));
+    this.live.isoShare = element('iso').value;
     return iso;
   }
 
   // The range of isosurfaces. Begins at one that is in the frame that is seen, unless the user is faster.
   async beginIso() {
-    const { index } = this.player, slider = element('iso'), before = slider.value;
+    const { index } = this.player, slider = element('iso');
     this.live.halt();
     const range = this.live.facts.range ?? (await howCommon())?.range ?? this.live.first.range;
     const { surface } = await howCommon({ frame: index }) ?? {};
-    if (surface != null && slider.value === before) slider.value = (surface - range[0]) / (range[1] - range[0]);
+    if (surface != null && !this.isIsoChosen) slider.value = (surface - range[0]) / (range[1] - range[0]);
     return range;
   }
 
@@ -228,9 +296,7 @@ class Steering {
 
   async copy() {
     try {
-      const text = await (await this.live.made('command', 'picture.png')).text();
-      await navigator.clipboard.writeText(text);
-      say('readout', `Copied: ${text}`);
+      await offer('The command that draws this', await (await this.live.made('command', 'picture.png')).text());
     } catch (error) { problem(error); }
   }
 

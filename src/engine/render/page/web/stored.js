@@ -21,16 +21,20 @@ class Stored {
     this.backdrops = new Map();
   }
 
-  async picture(sequence, index) {
+  async *pictures(sequence, index) {
+    yield this.whole(sequence, index);
+  }
+
+  loaded() { return () => true; }
+
+  async whole(sequence, index) {
     const holds = block => block.sequence === sequence && block.first <= index && index < block.first + block.count;
     const block = this.blocks.find(holds);
     if (!block) throw new Error(`this page lacks picture ${index}`);
     const { view } = this.sequences[sequence].pictures[index];
     const [{ pictures }, backdrop] = await Promise.all([this.unpack(block), this.backdrop(view)]);
-    return { planes: pictures[index - block.first], about: this.about, backdrop, shares: this.shares(view) };
+    return { planes: pictures[index - block.first], about: this.about, backdrop, shares: this.shares(view), quality: 'full' };
   }
-
-  whole(sequence, index) { return this.picture(sequence, index); }
 
   unpack(block) {
     const found = this.unpacked.get(block) ?? readBlock(bytesOf(block.script.textContent));
