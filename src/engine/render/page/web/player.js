@@ -42,7 +42,8 @@ class Player {
     this.adopt(source.about);
     this.beginTime();
     this.listen();
-    this.fold(window.matchMedia('(max-width: 50rem)').matches);
+    const hasControls = this.source.look || !element('colours').hidden;
+    this.fold(!hasControls || window.matchMedia('(max-width: 50rem)').matches);
     element('link').hidden = location.protocol === 'about:'; // a page within another has no address
   }
 

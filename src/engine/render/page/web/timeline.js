@@ -28,7 +28,7 @@ class TimeLine {
     if (!this.player.about || !this.last) return;
     const { last } = this, longest = Math.max(...[0, last].map(index => this.label(index).length)), line = element('time-ticks').clientWidth;
     const step = roundStep(last * (7 * longest + 24) / Math.max(line, 1)), marks = [];
-    for (let index = 0; index <= last - step / 2; index += step) marks.push(index);
+    for (let index = 0; index <= last - step; index += step) marks.push(index);
     const texts = [...marks, last].map(index => textAt(this.label(index).replace(/^(frame|t =) /, ''), index / last));
     element('time-ticks').replaceChildren(...texts);
   }
