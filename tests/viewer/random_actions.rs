@@ -81,7 +81,7 @@ fn act(browser: &mut Browser, random: &mut Random) -> String {
 }
 
 fn set(browser: &mut Browser, id: &str, value: &Value) -> String {
-    // As a user would: what is disabled or hidden cannot be set.
+    // What is disabled cannot be set.
     if browser.js(&format!("element('{id}')?.disabled")) != true {
         browser.set(id, value);
     }
@@ -136,12 +136,20 @@ fn the_address_brings_the_same_picture_back() {
         for id in ["iso", "place-z"].iter().filter(|id| id.starts_with(mode) || mode == "slice" && **id == "place-z") {
             set(&mut browser, id, &json!(0.625));
         }
+        if mode == "mip" {
+            for (id, value) in
+                [("map", json!("magma")), ("low", json!(0.2)), ("high", json!(0.9)), ("gamma", json!(0.5))]
+            {
+                set(&mut browser, id, &value);
+            }
+        }
         set(&mut browser, "frame", &json!(random.below(12)));
         if mode == "composite" {
             browser.js("player.bar.points = [[0, 0], [0.5, 0.8], [1, 1]]; player.bar.give()");
         }
         settle(&mut browser, &[mode.into()]);
-        let look = "[steering.live.look, player.index, player.range, steering.mode]";
+        let look =
+            "[steering.live.look, player.index, player.range, player.scale.gamma, element('map').value, steering.mode]";
         let before = (browser.js(look), browser.picture());
         browser.wait("location.hash.includes('frame=')");
         std::thread::sleep(std::time::Duration::from_millis(300)); // the address follows after a moment

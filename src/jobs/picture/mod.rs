@@ -11,7 +11,8 @@
 //! 4. Test it in `tests/cli`, and name it in `tools/guide/pictures.md`. Python takes the field as a keyword.
 //!
 //! If partial sums must agree on it, add it to `PictureSetup` (`engine/render/partial/head.rs`); if a picture's text must
-//! tell it, to `plan/provenance.rs`; if the viewer changes it, to `FIELDS` in `view_request.rs`, and to `request` in `engine/render/page/web/live.js`.
+//! tell it, to `plan/provenance.rs`; if the viewer changes it, to `FIELDS` in `view_request.rs`, and to `request` and `state` in
+//! `engine/render/page/web/live.js` and `restore` in `steer.js`.
 //!
 //! To add a mode, that is, another kind of picture:
 //!
@@ -19,7 +20,7 @@
 //!    `Mode` in `engine/render/mod.rs`.
 //! 2. Add its name to [`values::ModeName`], and make the variant from the request in `plan/modes.rs`. The compiler then
 //!    lists the steps of `plan` that must know it.
-//! 3. For the viewer, add it to `controls.html` and `steer.js`, and its colours to `coloursOf` in `live.js`
+//! 3. For the viewer, add it to `controls.html` with an icon of `page.html`, to `steer.js`, and its colours to `coloursOf` in `live.js`
 //!    (`engine/render/page/web`).
 
 mod reporter;

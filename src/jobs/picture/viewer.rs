@@ -88,7 +88,7 @@ pub struct Histogram {
     range: Option<(f64, f64)>,
     /// How many values lie in each of equal parts of the range.
     counts: Vec<usize>,
-    /// A value with a surface: halfway from the most common value to the end of the others that is farther from it, but for rare ones.
+    /// A value with a surface: halfway from the most common value to the farther end of the values, without rare ones.
     surface: Option<f64>,
 }
 
@@ -315,6 +315,8 @@ impl Histogram {
         let common = samples.empty((lo, hi)).or_else(|| samples.common((lo, hi))).map_or(lo, |common| common.value);
         let of_rank = |share: f64| f64::from(values[((values.len() - 1) as f64 * share) as usize]);
         let [least, most] = [RARE, 1.0 - RARE].map(of_rank);
+        // Where all other values are rare, they are all that there is to see.
+        let [least, most] = if least == most { [lo, hi] } else { [least, most] };
         let end = if most - common >= common - least { most } else { least };
         Self { range, counts, surface: Some((common + end) / 2.0) }
     }

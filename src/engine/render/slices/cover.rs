@@ -121,28 +121,42 @@ impl Rays {
     /// Where a ray meets the surface of a value between two points, if it does.
     pub(super) fn meeting(&self, value: f32, from: &CoverPoint, to: &CoverPoint) -> Option<Meeting> {
         let rises = [from, to].map(|place| self.rise(&place.gradient));
-        let bend = (rises[1] - rises[0]) / (to.at[2] - from.at[2]);
-        let share = rises[0] / (rises[0] - rises[1]);
-        let turn = (rises[0] * rises[1] < 0.0).then(|| turning_value(from, to, rises, share));
-        let meeting = if (from.value < value) != (to.value < value) {
-            let place = between(from, to, (value - from.value) / (to.value - from.value));
-            // A ray that turns in this step, and first leads away from the value, has turned before.
-            let leads_away = (rises[0] > 0.0) != (from.value < value);
-            let is_turn_behind = if turn.is_some() { leads_away } else { self.rise(&place.gradient) * bend > 0.0 };
-            let (end, rise) = if is_turn_behind { (from, rises[0]) } else { (to, rises[1]) };
-            let beyond = || (end.value - value).abs() + rise * rise / (2.0 * bend.abs());
-            let height = turn.map_or_else(beyond, |turn| (turn - value).abs());
-            let covered = self.of_height(height, &place.gradient);
-            let sheets = if is_turn_behind && covered < 1.0 { Sheets::Second } else { Sheets::One };
-            Meeting { gradient: place.gradient, covered: covered * self.within(&place, bend), sheets }
-        } else {
-            let turn = turn.filter(|_| (rises[0] > 0.0) == (from.value < value))?;
-            let place = between(from, to, share);
-            let height = if rises[0] > 0.0 { turn - value } else { value - turn };
-            let covered = self.of_height(height, &place.gradient) * self.within(&place, bend);
-            Meeting { gradient: place.gradient, covered, sheets: Sheets::Both }
+        let step = Step {
+            from,
+            to,
+            rises,
+            bend: (rises[1] - rises[0]) / (to.at[2] - from.at[2]),
+            turn: Turn::of(from, to, rises),
         };
+        let passes = (from.value < value) != (to.value < value);
+        let meeting = if passes { self.passed(value, &step) } else { self.almost_passed(value, &step)? };
         (meeting.covered > 0.0).then_some(meeting)
+    }
+
+    /// The meeting with a surface that a ray passes.
+    fn passed(&self, value: f32, step: &Step<'_>) -> Meeting {
+        let Step { from, to, rises, bend, turn } = step;
+        let place = between(from, to, step.share_of(value));
+        let has_turned = if turn.is_some() { step.leads_away(value) } else { self.rise(&place.gradient) * bend > 0.0 };
+        let height = turn.as_ref().map_or_else(
+            || {
+                let (end, rise) = if has_turned { (from, rises[0]) } else { (to, rises[1]) };
+                (end.value - value).abs() + rise * rise / (2.0 * bend.abs())
+            },
+            |turn| (turn.value - value).abs(),
+        );
+        let covered = self.of_height(height, &place.gradient);
+        let sheets = if has_turned && covered < 1.0 { Sheets::Second } else { Sheets::One };
+        Meeting { gradient: place.gradient, covered: covered * self.within(&place, *bend), sheets }
+    }
+
+    /// The meeting with a surface behind which a ray turns back, or before it.
+    fn almost_passed(&self, value: f32, step: &Step<'_>) -> Option<Meeting> {
+        let turn = step.turn.as_ref().filter(|_| !step.leads_away(value))?;
+        let place = between(step.from, step.to, step.share_of(value)); // the first sheet, or the turn
+        let height = if step.rises[0] > 0.0 { turn.value - value } else { value - turn.value };
+        let covered = self.of_height(height, &place.gradient) * self.within(&place, step.bend);
+        Some(Meeting { gradient: place.gradient, covered, sheets: Sheets::Both })
     }
 
     /// Marks the cells in which one of the surfaces may show between two slices: cell i by bit i.
@@ -186,6 +200,53 @@ impl Rays {
             _ => [b, c],
         })
     }
+}
+
+/// A step of a ray.
+struct Step<'a> {
+    from: &'a CoverPoint,
+    to: &'a CoverPoint,
+    /// The changes of the field along the ray at both ends, and the change of that change.
+    rises: [f32; 2],
+    bend: f32,
+    turn: Option<Turn>,
+}
+
+/// Where a ray turns within a step, as a share of the way, and the field there.
+struct Turn {
+    share: f32,
+    value: f32,
+}
+
+impl Turn {
+    fn of(from: &CoverPoint, to: &CoverPoint, rises: [f32; 2]) -> Option<Self> {
+        let share = rises[0] / (rises[0] - rises[1]);
+        (rises[0] * rises[1] < 0.0).then(|| Self { share, value: turning_value(from, to, rises, share) })
+    }
+}
+
+impl Step<'_> {
+    /// Whether the first rise leads away from a value. A ray that turns in this step has turned before it passes the value then.
+    fn leads_away(&self, value: f32) -> bool {
+        (self.rises[0] > 0.0) != (self.from.value < value)
+    }
+
+    /// Where the field passes a value, as a share of the way: before the turn or behind it, for there the gradient has the sign of the
+    /// surface that is passed.
+    fn share_of(&self, value: f32) -> f32 {
+        let (from, to) = (self.from.value, self.to.value);
+        match &self.turn {
+            None => (value - from) / (to - from),
+            Some(turn) if self.leads_away(value) => turn.share + (1.0 - turn.share) * part(value, turn.value, to),
+            Some(turn) => turn.share * part(value, from, turn.value),
+        }
+    }
+}
+
+/// How far a value is from one number to another, from 0 to 1.
+fn part(value: f32, from: f32, to: f32) -> f32 {
+    let part = (value - from) / (to - from);
+    if part.is_nan() { 0.5 } else { part.clamp(0.0, 1.0) }
 }
 
 /// The field between two points, by linear interpolation.

@@ -146,14 +146,16 @@ impl Step<'_> {
 
     fn passed(&self, value: f32, of_surface: f32) -> Shown {
         let distance = |place: &Place| Interval::size(place.point.value - value, place.error);
-        let share = distance(self.from).share_of(distance(self.to));
+        let straight = distance(self.from).share_of(distance(self.to));
+        // Where the ray turns, it passes the value before or behind its turn, which is anywhere.
+        let share = if self.turns() == Some(false) { straight } else { Interval { least: 0.0, most: 1.0 } };
         let (change, bend) = (self.change(share), self.bend());
-        let behind = self.turns_behind(value, &change);
-        let height = self.height_of_passed(value, behind);
+        let has_turned = self.has_turned(value, &change);
+        let height = self.height_of_passed(value, has_turned);
         let (covered, within) = (self.shares(height, change.across), self.within(share, &change, bend));
         let all = Interval { least: covered.least * within.least, most: covered.most * within.most };
         let (first, second) = (all.map(|x| x * of_surface), all.map(|x| opacity_of_second(x * of_surface, of_surface)));
-        let opacity = match (behind, covered.least >= 1.0, covered.most < 1.0) {
+        let opacity = match (has_turned, covered.least >= 1.0, covered.most < 1.0) {
             (Some(false), ..) | (_, true, _) => first,
             (Some(true), _, true) => second,
             _ => first.hull(second),
@@ -165,8 +167,8 @@ impl Step<'_> {
         if self.is_towards(value) == Some(false) {
             return None;
         }
-        let share = self.turning_share();
-        let over = self.turning_value(share);
+        let turn = self.turning_share();
+        let over = self.turning_value(turn);
         let over = Interval { least: over.least - value, most: over.most - value };
         let under = Interval { least: -over.most, most: -over.least };
         let height = match self.from.rises() {
@@ -174,6 +176,7 @@ impl Step<'_> {
             Some(false) => under,
             None => over.hull(under),
         };
+        let share = Interval { least: 0.0, most: turn.most }; // the first sheet is before the turn
         let change = self.change(share);
         let (covered, within) = (self.shares(height, change.across), self.within(share, &change, self.bend()));
         let both = |x: f32| x * of_surface * (2.0 - of_surface);
@@ -205,8 +208,8 @@ impl Step<'_> {
         Change { gradient, off, rise, across }
     }
 
-    /// Whether a ray turns back behind a place where it passes a surface.
-    fn turns_behind(&self, value: f32, change: &Change) -> Option<bool> {
+    /// Whether a ray has turned before a place where it passes a surface.
+    fn has_turned(&self, value: f32, change: &Change) -> Option<bool> {
         let (rise, bend) = (change.rise, self.bend());
         let is_certain = !rise.holds(0.0) && !bend.holds(0.0);
         let straight = is_certain.then_some((rise.least > 0.0) == (bend.least > 0.0));
@@ -219,7 +222,7 @@ impl Step<'_> {
     }
 
     /// How far the ray goes beyond a surface that it passes.
-    fn height_of_passed(&self, value: f32, behind: Option<bool>) -> Interval {
+    fn height_of_passed(&self, value: f32, has_turned: Option<bool>) -> Interval {
         let turned = || {
             let turn = self.turning_value(self.turning_share());
             Interval::size(turn.middle() - value, turn.half())
@@ -234,7 +237,7 @@ impl Step<'_> {
                 most: if most.is_nan() { f32::INFINITY } else { most },
             }
         };
-        let straight = || match behind {
+        let straight = || match has_turned {
             Some(true) => beyond(self.from),
             Some(false) => beyond(self.to),
             None => beyond(self.from).hull(beyond(self.to)),

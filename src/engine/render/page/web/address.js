@@ -7,6 +7,7 @@ const Address = {
 
   // Writes the fields that have a value.
   write(state) {
+    if (this.isLeft) return;
     const known = Object.entries(state).filter(([, value]) => value !== null && value !== undefined && value !== '');
     this.text = known.map(([name, value]) => `${name}=${encodeURIComponent(value).replace(/%2C/g, ',').replace(/%3A/g, ':')}`).join('&');
     clearTimeout(this.waiting);
@@ -21,7 +22,11 @@ const Address = {
 };
 
 // A link that is opened in the same tab changes only the state.
-addEventListener('hashchange', () => location.reload());
+addEventListener('hashchange', () => {
+  clearTimeout(Address.waiting);
+  Address.isLeft = true;
+  location.reload();
+});
 
 // Numbers that are separated by commas, if there are so many; else nothing.
 function numbersIn(text, count) {

@@ -64,7 +64,7 @@ class Bar {
     this.scale = scale;
     this.paintStrip = paintStrip;
     const ends = [...scale.range, ...automatic].filter(end => !scale.log || end > 0);
-    if (!this.isHeld) this.domain = [Math.min(...ends), Math.max(...ends)];
+    if (!this.isEndHeld) this.domain = [Math.min(...ends), Math.max(...ends)];
     this.draw();
   }
 
@@ -87,18 +87,21 @@ class Bar {
     return (clientX - left) / width;
   }
 
+  // In steps that show: of the bar, or of the value itself.
+  rounded(value) { return rounded(value, this.scale.log ? value : this.domain[1] - this.domain[0]); }
+
   listenToEnd(handle, end) {
     const moved = (place, isMoving) => {
       const least = 0.005, other = this.place(this.scale.range[1 - end]);
       const within = end ? clamped(place, other + least, 1.5) : clamped(place, -0.5, other - least);
       const range = [...this.scale.range];
-      range[end] = rounded(this.value(within), this.domain[1] - this.domain[0]);
+      range[end] = this.rounded(this.value(within));
       if (!(range[0] < range[1])) return;
       this.isMoved = isMoving;
       this.ranged(range, isMoving);
     };
-    handle.addEventListener('pointerdown', event => { if (event.button === 0) this.isHeld = true; handle.setPointerCapture(event.pointerId); });
-    handle.addEventListener('pointermove', event => { if (this.isHeld && event.buttons) moved(this.placeOf(event), true); });
+    handle.addEventListener('pointerdown', event => { if (event.button === 0) this.isEndHeld = true; handle.setPointerCapture(event.pointerId); });
+    handle.addEventListener('pointermove', event => { if (this.isEndHeld && event.buttons) moved(this.placeOf(event), true); });
     for (const name of ['pointerup', 'pointercancel']) handle.addEventListener(name, () => this.release());
     handle.addEventListener('keydown', ({ key }) => {
       const by = { ArrowLeft: -0.01, ArrowDown: -0.01, ArrowRight: 0.01, ArrowUp: 0.01 }[key];
@@ -108,20 +111,20 @@ class Bar {
 
   release() {
     const { isMoved } = this;
-    this.isHeld = this.isMoved = false;
+    this.isEndHeld = this.isMoved = false;
     if (isMoved) this.ranged(this.scale.range, false);
   }
 
   listenToPoints(plot) {
-    plot.addEventListener('pointerdown', event => { this.held = event.button === 0 ? this.point(event) : -1; plot.setPointerCapture(event.pointerId); });
-    plot.addEventListener('pointermove', event => { if (this.held >= 0 && event.buttons) this.movePoint(event); });
-    for (const end of ['pointerup', 'pointercancel']) plot.addEventListener(end, () => { this.held = -1; });
+    plot.addEventListener('pointerdown', event => { this.heldPoint = event.button === 0 ? this.point(event) : -1; plot.setPointerCapture(event.pointerId); });
+    plot.addEventListener('pointermove', event => { if (this.heldPoint >= 0 && event.buttons) this.movePoint(event); });
+    for (const end of ['pointerup', 'pointercancel']) plot.addEventListener(end, () => { this.heldPoint = -1; });
     plot.addEventListener('dblclick', event => this.togglePoint(event));
   }
 
   // Follows opacities: those of a picture, or none. Points that the user holds stay.
   follow(opacity, isSuggested) {
-    if (!(this.held >= 0) && (isSuggested || !opacity || !this.points)) {
+    if (!(this.heldPoint >= 0) && (isSuggested || !opacity || !this.points)) {
       this.line = opacity && isSuggested ? opacity : null;
       this.points = opacity && (isSuggested ? simplified(opacity) : opacity);
     }
@@ -154,7 +157,7 @@ class Bar {
   }
 
   movePoint(event) {
-    const [share, opacity] = this.at(event), n = this.held, last = this.points.length - 1;
+    const [share, opacity] = this.at(event), n = this.heldPoint, last = this.points.length - 1;
     const low = n ? this.points[n - 1][0] + 0.002 : 0, high = n < last ? this.points[n + 1][0] - 0.002 : 1;
     this.points[n] = [n === 0 ? 0 : n === last ? 1 : low < high ? clamped(share, low, high) : this.points[n][0], opacity];
     this.give();
@@ -187,6 +190,11 @@ class Bar {
       handle.style.left = `${100 * clamped(this.place(value), 0, 1)}%`;
       Object.assign(handle, { ariaValueText: shortNumber(value), ariaValueNow: value, ariaValueMin: this.domain[0], ariaValueMax: this.domain[1] });
     });
+    this.drawPlot();
+  }
+
+  showCounts(counts) {
+    this.counts = counts;
     this.drawPlot();
   }
 

@@ -44,12 +44,6 @@ class Scale {
     return this.gamma === 1 ? within : within ** this.gamma;
   }
 
-  // The value at a share of the range.
-  value(share) {
-    const [low, high] = this.ends, at = low + share ** (1 / this.gamma) * (high - low);
-    return this.log ? Math.exp(at) : at;
-  }
-
   // How much of its colour a value shows, 0 to 1. Values of empty space show the background.
   presence(value) {
     if (!this.clear) return 1;

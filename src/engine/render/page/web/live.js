@@ -44,6 +44,7 @@ class Live {
     this.coarser = {}; // which coarse pictures each mode takes
     this.pace = {}; // milliseconds that a full picture of each mode takes
     this.lastPace = {}; // and that its last coarse picture took
+    this.coarseTime = LATE; // what the last one of all took
     this.kept = new Map(); // pictures of each look, the last one used at the end
     this.turn = Promise.resolve();
     this.underWay = null; // the request that is asked
@@ -141,7 +142,7 @@ class Live {
     return [COARSE, FULL, ...(isDense ? [SHARP] : [])];
   }
 
-  // The pictures of a frame, the coarse one first.
+  // The pictures of a frame: the best one that is there, or a coarse one at first, and then better ones.
   async *pictures(_, index, isPlaying) {
     const step = Math.sign(index - (this.index ?? index));
     this.index = index;
@@ -153,7 +154,7 @@ class Live {
       if (wanted !== this.wanted) return;
       const picture = await this.wantedPicture(quality, index, isPlaying, wanted).catch(error => this.orNone(error, quality));
       if (picture && (wanted === this.wanted || this.isMoving)) yield picture;
-      if (quality === COARSE && step && !isPlaying) await this.loadNext(index, step, wanted);
+      if (quality === COARSE && step && !isPlaying && this.coarseTime <= LATE) await this.loadNext(index, step, wanted);
     }
     if (wanted !== this.wanted || this.isMoving) return;
     if (isPlaying) this.playAhead(qualities[0], index);
@@ -169,7 +170,7 @@ class Live {
 
   // Does without sharp pictures from then on if the server lacks memory for one.
   orNone(error, quality) {
-    if (quality !== SHARP || isPassing(error)) throw error;
+    if (quality !== SHARP || !error.message.startsWith('memory')) throw error;
     this.isTooSharp = true;
     return null;
   }
@@ -188,8 +189,7 @@ class Live {
 
   // Loads the next frames while those before them play.
   playAhead(quality, index) {
-    const [, next] = this.block(index, quality), last = this.sequences[0].pictures.length;
-    const first = next < last ? next : 0;
+    const [, next] = this.block(index, quality), first = next < this.sequences[0].pictures.length ? next : 0;
     if (this.found(quality, first) || this.found(FULL, first) || this.underWay) return;
     this.load(this.key(quality), { frames: this.block(first, quality), quality, index: first, rank: AHEAD }).catch(problem);
   }
@@ -251,7 +251,7 @@ class Live {
     this.kind = about.kind;
     for (const name in about.maps) about.maps[name] = bytesOf(about.maps[name]);
     const { title, labels } = this.facts;
-    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, hasBar: mode === 'composite', opacity });
+    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, opacity });
     about.mode = mode === 'error' && !errors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
     if (!isChosen) this.learnColours(colours, about, quality);
@@ -279,6 +279,7 @@ class Live {
   learnPace(mode, quality, milliseconds, [first, end]) {
     if (quality === FULL) this.pace[mode] = milliseconds;
     if (quality !== COARSE || end - first > 1) return;
+    this.coarseTime = milliseconds;
     const n = this.coarser[mode] ?? FIRST, two = [milliseconds, this.lastPace[mode] ?? (SOON + LATE) / 2];
     const by = Math.min(...two) > LATE ? 1 : Math.max(...two) < SOON ? -1 : 0;
     this.coarser[mode] = clamped(n + by, 0, COARSER.length - 1);
@@ -322,10 +323,14 @@ class Live {
 
   // Loads coarse pictures of the frames beside, and then full ones of the frames around and behind.
   async fill(index) {
-    const last = this.sequences[0].pictures.length, around = this.block(index, FULL);
-    const beside = [clamped(index - 2, 0, last - 1), clamped(index + 4, 1, last)];
+    const count = this.sequences[0].pictures.length, around = this.block(index, FULL), { wanted } = this;
+    const beside = [clamped(index - 2, 0, count - 1), clamped(index + 4, 1, count)];
     if (this.look.mode !== 'error') await this.loadMissing(beside, COARSE);
-    for (const frames of [around, ...(around[1] < last ? [this.block(around[1], FULL)] : [])]) await this.loadMissing(frames, FULL);
+    for (const frames of [around, ...(around[1] < count ? [this.block(around[1], FULL)] : [])]) {
+      if (wanted !== this.wanted) return;
+      await this.loadMissing(frames, FULL);
+    }
+    if (wanted !== this.wanted) return;
     document.documentElement.dataset.filled = index;
     this.filled();
   }

@@ -1,7 +1,7 @@
 // Shows the pictures of a source: their colours, what lies under the pointer, and plots over time.
 //
 // A source has `sequences`, lists of pictures with their view and frame; `about`, a first description of them; and
-// `pictures(sequence, index, isPlaying)`, which gives a picture again and again, the coarsest first: its planes, its own description, and
+// `pictures(sequence, index, isPlaying)`, which gives pictures of a frame, each better than the one before: its planes, its own description, and
 // the RGBA bytes behind it.
 
 const element = id => document.getElementById(id);
@@ -62,7 +62,8 @@ class Player {
 
   // What the address keeps.
   get state() {
-    const { range, isLog, gamma } = this.chosen[`of ${this.source.look?.mode ?? this.about.mode}`] ?? {}, { frame } = this.pictures[this.index];
+    const mode = this.source.look?.mode, hasErrors = mode !== 'error' || this.about.mode === 'error';
+    const { range, isLog, gamma } = this.chosen[`of ${hasErrors && mode || this.about.mode}`] ?? {}, { frame } = this.pictures[this.index];
     return {
       frame, sequence: this.sequence || null, map: this.chosen.map, range: range?.join() ?? null, log: isLog === undefined ? null : Number(isLog),
       gamma: Number(gamma) || null,
@@ -279,7 +280,7 @@ class Player {
     const painted = about.kind === 'value' && !this.scale.log ? [weighed(planes[0], shares, about.beyond)] : planes;
     paint(painted, about.kind, this.scale, backdrop ?? this.plainBackground(planes[0].length), this.image.data);
     this.context.putImageData(this.image, 0, 0);
-    if (about.kind === 'value') this.bar.counts = countsOf(painted[0], this.bar.domain);
+    if (about.kind === 'value') this.bar.showCounts(countsOf(painted[0], this.bar.domain));
     document.documentElement.dataset.drawn = `${this.sequence}:${this.index}`;
   }
 
@@ -413,8 +414,7 @@ function ticks(scale) {
     const first = Math.ceil(Math.log10(low)), count = Math.floor(Math.log10(high)) - first + 1, every = Math.ceil(count / 7);
     return Array.from({ length: Math.ceil(count / every) }, (_, n) => 10 ** (first + n * every));
   }
-  const rough = (high - low) / 6, unit = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map(n => n * unit).find(step => step >= rough);
+  const step = roundStep((high - low) / 6);
   const first = Math.ceil(low / step - 1e-9);
   return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, n) => (first + n) * step);
 }

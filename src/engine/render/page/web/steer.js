@@ -47,14 +47,14 @@ class Steering {
   // Takes up the state of the address.
   restore() {
     const { mode, view, center, zoom, iso, slices, opacity, shade, box, white } = Address.read(), share = text => clamped(Number(text) || 0, 0, 1);
-    this.mode = mode;
+    this.mode = mode ?? 'mean';
     const [angles, middle, [factor] = [], [place] = []] = [numbersIn(view, 2), numbersIn(center, 3), numbersIn(zoom, 1) ?? [], numbersIn(iso, 1) ?? []];
     if (angles) this.live.look.view = turned(angles, [0, 0], 1);
     if (middle) this.live.look.center = middle;
     if (factor > 0) this.live.look.zoom = clamped(factor, ...ZOOM);
     if (place !== undefined) [element('iso').value, this.isIsoChosen] = [share(place), true];
-    const chosen = pairs(slices).filter(([axis]) => AXES.includes(axis));
-    if (chosen.length) AXES.forEach(axis => { element(`slice-${axis}`).checked = false; });
+    const known = pairs(slices).filter(([axis]) => AXES.includes(axis)), chosen = known.length ? known : [['z', 0.5]];
+    AXES.forEach(axis => { [element(`slice-${axis}`).checked, element(`place-${axis}`).value] = [false, 0.5]; });
     for (const [axis, at] of chosen) [element(`slice-${axis}`).checked, element(`place-${axis}`).value] = [true, share(at)];
     const points = pairs(opacity).map(point => point.map(Number)).filter(point => point.every(n => n >= 0 && n <= 1));
     const isInOrder = points.every(([at], n) => n === 0 ? at === 0 : at > points[n - 1][0]) && points.at(-1)?.[0] === 1;
@@ -121,7 +121,7 @@ class Steering {
 
   // The coordinate of a voxel, or of a place between two, with its unit.
   coordinate(axis, voxel) {
-    const { unit, at } = this.live.facts.axes[axis], within = Math.min(Math.max(voxel, 0), at.length - 1), below = Math.floor(within);
+    const { unit, at } = this.live.facts.axes[axis], within = clamped(voxel, 0, at.length - 1), below = Math.floor(within);
     const value = at[below] + (within - below) * ((at[below + 1] ?? at[below]) - at[below]);
     return `${shortNumber(value)}${unit && ` ${unit}`}`;
   }
@@ -130,7 +130,7 @@ class Steering {
   async plot(event, isWanted) {
     const point = this.point(event), { origin, spacing, dims } = this.live.facts, place = this.place(event);
     if (!point) return false;
-    const share = point.map((at, axis) => dims[axis] > 1 ? Math.min(Math.max((at - origin[axis]) / (spacing[axis] * (dims[axis] - 1)), 0), 1) : 0);
+    const share = point.map((at, axis) => dims[axis] > 1 ? clamped((at - origin[axis]) / (spacing[axis] * (dims[axis] - 1)), 0, 1) : 0);
     const answer = await fetch('series', { method: 'POST', body: JSON.stringify(share) });
     if (!answer.ok) return false; // frames have no series of their own: the pixel's is plotted
     if (!isWanted()) return true;
@@ -216,7 +216,7 @@ class Steering {
     element('slice-control').hidden = mode !== 'slice';
     element('opacity-control').hidden = mode !== 'composite';
     element('bar').classList.toggle('open', mode === 'composite');
-    element('bar').hidden = mode === 'iso';
+    element('bar').hidden = mode === 'iso' || this.live.kind === 'channels';
     this.size = this.sizes; // the picture has another place now, for which it is asked anyway
     say('help-click', this.player.pictures.length > 1 ? CLICKS[mode] ?? '' : '');
     const ticked = AXES.filter(axis => element(`slice-${axis}`).checked);
@@ -238,7 +238,7 @@ class Steering {
     document.documentElement.classList.toggle('old', isOld);
     element('iso-note').hidden = about.mode !== 'iso' || planes[3].some(opacity => opacity > 0.01);
     if (isOld) return;
-    if (about.kind === 'channels') element('bar').hidden = true;
+    element('bar').hidden = about.mode === 'iso' || about.kind === 'channels';
     if (about.mode !== 'composite') return bar.follow(null);
     if (look.opacity) bar.follow(look.opacity, false);
     else if (quality !== COARSE || !bar.points) bar.follow(about.opacity, true);
@@ -251,8 +251,7 @@ class Steering {
     this.common ??= howCommon();
     const common = await this.common;
     if (!common?.range || this.mode !== 'composite') return;
-    bar.counts = countsOver(bar.domain, common);
-    bar.drawPlot();
+    bar.showCounts(countsOver(bar.domain, common));
   }
 
   // Shows what the controls say.

@@ -27,7 +27,7 @@ class TimeLine {
   mark() {
     if (!this.player.about || !this.last) return;
     const { last } = this, longest = Math.max(...[0, last].map(index => this.label(index).length)), line = element('time-ticks').clientWidth;
-    const step = roundStep(last * (7 * longest + 24) / Math.max(line, 1)), marks = [];
+    const step = roundStep(Math.max(last * (7 * longest + 24) / Math.max(line, 1), 1)), marks = [];
     for (let index = 0; index <= last - step; index += step) marks.push(index);
     const texts = [...marks, last].map(index => textAt(this.label(index).replace(/^(frame|t =) /, ''), index / last));
     element('time-ticks').replaceChildren(...texts);
@@ -73,6 +73,6 @@ class TimeLine {
 
 // The least round step that is not below a number.
 function roundStep(least) {
-  const unit = 10 ** Math.floor(Math.log10(Math.max(least, 1)));
+  const unit = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map(n => n * unit).find(step => step >= least);
 }

@@ -97,3 +97,31 @@ fn surfaces_end_at_the_faces_of_the_volume() {
         }
     }
 }
+
+/// A plate that barely reaches the value is lit from the front, wherever the slices lie.
+#[test]
+fn thin_sheets_show_the_side_that_is_seen() {
+    const WIDTH: f64 = 0.6;
+    const SIGMA: f64 = 0.5;
+    let grid = grid([14, 13, 16]);
+    let view = View { azimuth: 180.0, elevation: 90.0, size: [40, 40], ..views()[0] };
+    let bell = |x: f64, width: f64| (-x * x / (2.0 * width * width)).exp();
+    let towards = LAMP.azimuth.to_radians().cos() * LAMP.elevation.to_radians().cos();
+    let gloss = LAMP.specular * ((1.0 + towards) / (2.0 + 2.0 * towards).sqrt()).powi(32);
+    let expected = 0.5 * (LAMP.ambient + LAMP.diffuse * towards) + gloss;
+    for (phase, share) in (0..10).flat_map(|phase| [0.9, 0.97, 0.99].map(|share| (f64::from(phase) / 10.0, share))) {
+        let middle = 7.0 + phase;
+        let field = |z: f64| {
+            let weights = (0..16).map(|k| (f64::from(k), bell(z - f64::from(k), SIGMA)));
+            let [values, all] = weights.fold([0.0; 2], |[v, w], (k, h)| [v + h * bell(k - middle, WIDTH), w + h]);
+            values / all
+        };
+        let peak = (0..2000).map(|n| field(6.0 + f64::from(n) * 1e-3 * 1.5)).fold(0.0, f64::max);
+        let values = grid.whole().iter().map(|[_, _, z]| bell(z as f64 - middle, WIDTH)).collect();
+        let case = Case { values, view, region: None, sigma: SIGMA, grid };
+        let surface = Surface { value: share * peak, colour: [0.5; 3], opacity: 1.0 };
+        let found = case.picture(Mode::Iso { surfaces: vec![surface], light: LAMP, slices: None });
+        let pixel = &found[4 * (20 * 40 + 20)..][..4];
+        assert!((f64::from(pixel[0]) - expected).abs() < 0.02, "{middle} {share}: {pixel:?}, not {expected}");
+    }
+}
