@@ -26,9 +26,11 @@ class TimeLine {
   // Writes the times of some frames under the line, as many as have room.
   mark() {
     if (!this.player.about || !this.last) return;
-    const { last } = this, longest = Math.max(...[0, last].map(index => this.label(index).length)), line = element('time-ticks').clientWidth;
-    const step = roundStep(Math.max(last * (7 * longest + 24) / Math.max(line, 1), 1)), marks = [];
-    for (let index = 0; index <= last - step; index += step) marks.push(index);
+    const { last } = this, letters = Math.max(...[0, last].map(index => this.label(index).length)), line = element('time-ticks').clientWidth;
+    const wide = last * (7 * letters + 8) / Math.max(line, 1), step = roundStep(Math.max(1.2 * wide, 1)), marks = [0]; // widths in frames
+    for (let index = step; index < last; index += step) {
+      if (index >= 1.5 * wide && index <= last - 1.5 * wide) marks.push(index); // the texts at both ends stand within the line
+    }
     const texts = [...marks, last].map(index => textAt(this.label(index).replace(/^(frame|t =) /, ''), index / last));
     element('time-ticks').replaceChildren(...texts);
   }
