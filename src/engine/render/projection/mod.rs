@@ -156,6 +156,7 @@ impl Pictures {
         sink: &mut PictureSink<'_>,
     ) -> Result<()> {
         for (i, frame) in frames.iter().enumerate() {
+            progress.check()?;
             let [picture, error] = [i, frames.len() + i].map(|i| Self::together(channels, i));
             progress.advance(1);
             sink(Rendered {

@@ -115,6 +115,7 @@ impl<B: Blend> SlicePass<'_, B> {
             let ready = self.view.ready(next, met);
             next = ready.end;
             for first in ready.clone().step_by(SLABS) {
+                progress.check()?;
                 let numbers = first..ready.end.min(first + SLABS);
                 let slabs: Vec<Slab> = numbers.filter_map(|number| self.view.slab(number)).collect();
                 frames.par_iter_mut().for_each(|frame| self.add(&slabs, frame));
