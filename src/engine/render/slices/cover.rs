@@ -153,8 +153,9 @@ impl Rays {
     /// The meeting with a surface behind which a ray turns back, or before it.
     fn almost_passed(&self, value: f32, step: &Step<'_>) -> Option<Meeting> {
         let turn = step.turn.as_ref().filter(|_| !step.leads_away(value))?;
-        let place = between(step.from, step.to, step.share_of(value)); // the first sheet, or the turn
         let height = if step.rises[0] > 0.0 { turn.value - value } else { value - turn.value };
+        let share = if height > 0.0 { step.share_of(value) } else { turn.share }; // the first sheet, or the turn
+        let place = between(step.from, step.to, share);
         let covered = self.of_height(height, &place.gradient) * self.within(&place, step.bend);
         Some(Meeting { gradient: place.gradient, covered, sheets: Sheets::Both })
     }

@@ -217,7 +217,7 @@ impl Step<'_> {
         match self.turns() {
             Some(true) => turned,
             Some(false) => straight,
-            None => straight.filter(|_| straight == turned),
+            None => None,
         }
     }
 

@@ -133,6 +133,7 @@ impl<'a, B: Blend> Sliced<'a, B> {
                     let each = planes.len() / frames.len();
                     behind.put(picture, &planes[n * each..][..each]);
                 }
+                progress.check()?;
                 sink(Rendered {
                     views: &[],
                     view: number,

@@ -88,7 +88,10 @@ class Bar {
   }
 
   // In steps that show: of the bar, or of the value itself.
-  rounded(value) { return rounded(value, this.scale.log ? value : this.domain[1] - this.domain[0]); }
+  rounded(value) {
+    const length = this.domain[1] - this.domain[0];
+    return rounded(value, this.scale.log ? Math.min(value, length) : length);
+  }
 
   listenToEnd(handle, end) {
     const moved = (place, isMoving) => {

@@ -66,6 +66,9 @@ class Live {
 
   home() { return { view: [30, 30], center: this.facts.center, zoom: 1 }; }
 
+  // Pixels of a world unit: all of the volume shows, and the names of its axes in narrow pictures.
+  scaleIn([width, height]) { return this.look.zoom * Math.min(0.95 * height, 0.76 * width) / (2 * this.facts.radius); }
+
   // Pixels of a picture that fills its place on the screen, up to a number along a side.
   screenSize(mostPixels) {
     const { clientWidth, clientHeight } = element('frame-of-picture'), room = [clientWidth, clientHeight].map(side => Math.max(side, 120));
@@ -84,14 +87,14 @@ class Live {
 
   // The request for the pictures of some frames: fields of a PictureRequest, as the texts of its options.
   request(frames, quality, chosen = {}) {
-    const { mode, view, center, zoom, map, range, opacity, slices, iso, shade, annotate, theme } = this.look, { size, lod } = this.measures(quality);
+    const { mode, view, center, map, range, opacity, slices, iso, shade, annotate, theme } = this.look, { size, lod } = this.measures(quality);
     const isOfErrors = mode === 'error', isComposite = mode === 'composite', known = this.known[this.colourKey(quality)];
     const automatic = known && (known.isFull || quality === COARSE) ? known : {};
     const colours = { map, ...automatic, ...(isComposite && range ? { range } : {}), ...chosen };
     const points = opacity ?? (quality === COARSE && !range ? automatic.opacity : null);
     const look = {
       mode: isOfErrors || mode === 'mean' ? undefined : mode, view: [view.join()], center: texts(center), size: size.join('x'),
-      scale: short(zoom * 0.95 * Math.min(...size) / (2 * this.facts.radius)), lod: lod || undefined, frames: frames?.join(':'),
+      scale: short(this.scaleIn(size)), lod: lod || undefined, frames: frames?.join(':'),
       shade: isComposite && shade, opacity: isComposite ? points?.map(point => point.join(':')).join() : undefined,
       iso: iso.length ? iso.join() : undefined, slice: slices.length ? slices.map(([axis, share]) => `${axis}=${short(100 * share)}%`) : undefined,
       annotate, theme, ...this.coloursOf(mode, colours),
@@ -222,7 +225,8 @@ class Live {
     const { underWay, turn: before } = this, isOfUser = rank === USER;
     const isHelp = underWay?.key === key && underWay.frames[0] <= index && index < underWay.frames[1];
     const isStopped = underWay && (underWay.quality !== COARSE || underWay.rank === AHEAD) && !isHelp;
-    if (isStopped && (isOfUser || rank === AHEAD && underWay.rank === AHEAD)) underWay.stop.abort();
+    const stops = isStopped && (isOfUser || rank === AHEAD && underWay.rank === AHEAD);
+    if (stops) underWay.stop.abort();
     const { wanted } = this;
     let done;
     this.turn = new Promise(resolve => { done = resolve; });
@@ -232,7 +236,7 @@ class Live {
       const kept = this.kept.get(key)?.get(index);
       if (kept) return kept;
       if (key !== this.key(quality) || (isOfUser ? wanted !== this.wanted : this.waiting > 0)) throw new Stale();
-      this.underWay = { key, frames, quality, rank, stop: new AbortController() };
+      this.underWay = { key, frames, quality, rank, stop: new AbortController(), waits: stops };
       return (await this.ask(key, frames, quality)).get(index);
     } finally {
       this.underWay = null;
@@ -245,14 +249,15 @@ class Live {
     const answer = await this.post('pictures', this.request(frames, quality), this.underWay.stop.signal, this.underWay.rank);
     const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer()), ended = performance.now();
     if (bytes.length > 2 ** 20 && bytes.length / (ended - started) * 1000 < SLOW) this.isSlow = true;
-    this.learnPace(mode, quality, (ended - begun) / (frames[1] - frames[0]), frames);
+    if (!this.underWay?.waits) this.learnPace(mode, quality, (ended - begun) / (frames[1] - frames[0]), frames); // not for what was stopped
     const length = new DataView(bytes.buffer).getUint32(0, true);
     const { about, blocks, errors, opacity } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
     this.kind = about.kind;
     for (const name in about.maps) about.maps[name] = bytesOf(about.maps[name]);
     const { title, labels } = this.facts;
     Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, opacity });
-    about.mode = mode === 'error' && !errors ? 'mean' : mode;
+    this.lacksErrors = mode === 'error' && !errors; // frames that were not converted have none
+    about.mode = this.lacksErrors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
     if (!isChosen) this.learnColours(colours, about, quality);
     const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;

@@ -62,8 +62,8 @@ class Player {
 
   // What the address keeps.
   get state() {
-    const mode = this.source.look?.mode, hasErrors = mode !== 'error' || this.about.mode === 'error';
-    const { range, isLog, gamma } = this.chosen[`of ${hasErrors && mode || this.about.mode}`] ?? {}, { frame } = this.pictures[this.index];
+    const { look, lacksErrors } = this.source, mode = look?.mode === 'error' && lacksErrors ? 'mean' : look?.mode ?? this.about.mode;
+    const { range, isLog, gamma } = this.chosen[`of ${mode}`] ?? {}, { frame } = this.pictures[this.index];
     return {
       frame, sequence: this.sequence || null, map: this.chosen.map, range: range?.join() ?? null, log: isLog === undefined ? null : Number(isLog),
       gamma: Number(gamma) || null,

@@ -95,7 +95,7 @@ class Steering {
   // World units of a pixel on the screen.
   unit() {
     const box = element('picture').getBoundingClientRect();
-    return 2 * this.live.facts.radius / (this.live.look.zoom * 0.95 * Math.min(box.width, box.height));
+    return 1 / this.live.scaleIn([box.width, box.height]);
   }
 
   // The world point under the pointer, on the slice that is nearest to the eye; null where none is.
@@ -238,7 +238,7 @@ class Steering {
     document.documentElement.classList.toggle('old', isOld);
     element('iso-note').hidden = about.mode !== 'iso' || planes[3].some(opacity => opacity > 0.01);
     if (isOld) return;
-    element('bar').hidden = about.mode === 'iso' || about.kind === 'channels';
+    element('bar').hidden = this.mode === 'iso' || about.kind === 'channels';
     if (about.mode !== 'composite') return bar.follow(null);
     if (look.opacity) bar.follow(look.opacity, false);
     else if (quality !== COARSE || !bar.points) bar.follow(about.opacity, true);

@@ -31,7 +31,7 @@ class TimeLine {
     for (let index = step; index < last; index += step) {
       if (index >= 1.5 * wide && index <= last - 1.5 * wide) marks.push(index); // the texts at both ends stand within the line
     }
-    const texts = [...marks, last].map(index => textAt(this.label(index).replace(/^(frame|t =) /, ''), index / last));
+    const texts = (last < 2 * wide ? [0] : [...marks, last]).map(index => textAt(this.label(index).replace(/^(frame|t =) /, ''), index / last));
     element('time-ticks').replaceChildren(...texts);
   }
 
