@@ -220,16 +220,16 @@ mod tests {
                 let turned = unit(std::array::from_fn(|_| random()));
                 let length = if n % 2 == 0 { off } else { off * random().abs() };
                 let moved = std::array::from_fn(|i| gradient[i] + turned[i] * length / per[i]);
-                let slope = shader.per_world_unit(gradient);
-                let (lights, doubt): ([[f32; 2]; 2], _) = match n % 3 {
-                    0 => {
-                        let sign = sign_of_rise(n % 2 == 0);
-                        let of_side = |gradient| shader.lit(shader.per_world_unit(gradient), sign);
-                        ([gradient, moved].map(of_side), shader.doubt_of_side(slope, sign, off, true))
-                    }
-                    _ => ([gradient, moved].map(|gradient| shader.shade_cell(gradient)), shader.doubt(gradient, off)),
+                let side = (n % 3 == 0).then(|| sign_of_rise(n % 2 == 0));
+                let lit = |gradient| match side {
+                    Some(sign) => shader.lit(shader.per_world_unit(gradient), sign),
+                    None => shader.shade_cell(gradient),
                 };
-                let [from, to] = lights;
+                let [from, to] = [gradient, moved].map(lit);
+                let doubt = match side {
+                    Some(sign) => shader.doubt_of_side(shader.per_world_unit(gradient), sign, off, true),
+                    None => shader.doubt(gradient, off),
+                };
                 for i in 0..2 {
                     let moved = (from[i] - to[i]).abs();
                     assert!(moved <= doubt[i], "{faint}: {gradient:?} by {off}, {from:?} to {to:?}, {doubt:?}");

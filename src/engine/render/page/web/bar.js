@@ -127,6 +127,7 @@ class Bar {
 
   // Follows opacities: those of a picture, or none. Points that the user holds stay.
   follow(opacity, isSuggested) {
+    if (!opacity && !this.points) return; // values have none
     if (!(this.heldPoint >= 0) && (isSuggested || !opacity || !this.points)) {
       this.line = opacity && isSuggested ? opacity : null;
       this.points = opacity && (isSuggested ? simplified(opacity) : opacity);

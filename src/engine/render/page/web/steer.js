@@ -48,7 +48,7 @@ class Steering {
   restore() {
     const { mode, view, center, zoom, iso, slices, opacity, shade, box, white } = Address.read(), share = text => clamped(Number(text) || 0, 0, 1);
     this.mode = mode ?? 'mean';
-    const [angles, middle, [factor] = [], [place] = []] = [numbersIn(view, 2), numbersIn(center, 3), numbersIn(zoom, 1) ?? [], numbersIn(iso, 1) ?? []];
+    const angles = numbersIn(view, 2), middle = numbersIn(center, 3), [factor] = numbersIn(zoom, 1) ?? [], [place] = numbersIn(iso, 1) ?? [];
     if (angles) this.live.look.view = turned(angles, [0, 0], 1);
     if (middle) this.live.look.center = middle;
     if (factor > 0) this.live.look.zoom = clamped(factor, ...ZOOM);

@@ -33,7 +33,7 @@ class Stored {
     if (!block) throw new Error(`this page lacks picture ${index}`);
     const { view } = this.sequences[sequence].pictures[index];
     const [{ pictures }, backdrop] = await Promise.all([this.unpack(block), this.backdrop(view)]);
-    return { planes: pictures[index - block.first], about: this.about, backdrop, shares: this.shares(view), quality: 'full' };
+    return { planes: pictures[index - block.first], about: this.about, backdrop, shares: this.shares(view) };
   }
 
   unpack(block) {
