@@ -2,6 +2,7 @@
 
 use super::browser::Browser;
 use super::interaction::{FULL, opened};
+use super::running_viewer::Served;
 use super::{converted, converted_from};
 use crate::cli::Archive;
 use serde_json::{Value, json};
@@ -201,4 +202,21 @@ fn long_messages_do_not_resize_the_picture() {
         choose_mode(&mut browser, mode);
         assert_eq!(browser.js("document.documentElement.scrollWidth <= 390"), true, "{mode}");
     }
+}
+
+#[test]
+fn the_viewer_opens_as_its_options_say() {
+    let Some(mut browser) = Browser::start([900, 600]) else { return };
+    let work = converted("");
+    let served = Served::start(&work, "a.wspl -- --mode mip --range 0,0.5");
+    browser.open(&served.address);
+    browser.wait(FULL);
+    let seen = "[steering.mode, player.about.mode, player.range]";
+    assert_eq!(browser.js(seen), json!(["mip", "mip", [0, 0.5]]));
+    choose_mode(&mut browser, "mean");
+    browser.wait(FULL);
+    assert_eq!(browser.js(seen), json!(["mean", "mean", [0, 0.5]]));
+    browser.open(&served.address);
+    browser.wait(FULL);
+    assert_eq!(browser.js("steering.mode"), "mean", "the address keeps it");
 }

@@ -96,9 +96,19 @@ pub(super) struct DecodedBlocks {
     kept: Mutex<Kept>,
 }
 
+/// Whether somebody waits for a run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Rank {
+    #[default]
+    Now,
+    /// It replaces nothing that is kept, and counts as a part of the run before.
+    Ahead,
+}
+
 #[derive(Debug, Default)]
 struct Kept {
     entries: HashMap<DecodedKey, Entry>,
+    rank: Rank,
     /// Blocks whose samples were read.
     read: HashSet<(BlockId, u32)>,
     /// Blocks that pictures used.
@@ -162,8 +172,10 @@ impl DecodedBlocks {
     }
 
     /// Begins a run: a picture, or a read of samples.
-    pub(super) fn begin_run(&self) {
-        self.kept().run += 1;
+    pub(super) fn begin_run(&self, rank: Rank) {
+        let mut kept = self.kept();
+        kept.rank = rank;
+        kept.run += u64::from(rank == Rank::Now);
     }
 
     /// Whether samples of a block were read before. It is remembered.
@@ -313,7 +325,7 @@ impl Kept {
             return;
         }
         while self.bytes + bytes > room {
-            let oldest = self.old().min_by_key(|(_, entry)| entry.used);
+            let oldest = self.old().filter(|_| self.rank == Rank::Now).min_by_key(|(_, entry)| entry.used);
             let Some(oldest) = oldest.map(|(key, _)| key.clone()) else { return };
             self.bytes -= self.entries.remove(&oldest).map_or(0, |entry| entry.bytes);
         }
@@ -350,7 +362,7 @@ mod tests {
     fn reads_go_on_with_frames_that_fit() {
         let blocks = DecodedBlocks::new(100);
         let ahead = |bytes, end, frames| {
-            blocks.begin_run();
+            blocks.begin_run(Rank::Now);
             let region = Region { start: [0; 3], end: [end; 3] };
             blocks.ahead(&FramesRead { channel: 0, region, frames }, bytes, &(8..20))
         };
@@ -370,7 +382,7 @@ mod tests {
         assert!(blocks.samples(&key(7)).is_some());
         assert_eq!(ahead(30, 4, 9..10), Some(9..11), "beside what the last run used");
         let twice = FramesRead { channel: 0, region: Region { start: [0; 3], end: [5; 3] }, frames: 8..9 };
-        blocks.begin_run();
+        blocks.begin_run(Rank::Now);
         let next = FramesRead { frames: 9..10, ..twice.clone() };
         assert_eq!([&twice, &next].map(|read| blocks.ahead(read, 30, &(8..20))), [None, None], "one run");
     }
@@ -379,7 +391,7 @@ mod tests {
     fn never_more_is_kept_than_there_is_room_for() {
         let blocks = DecodedBlocks::new(1000);
         for run in 0..50 {
-            blocks.begin_run();
+            blocks.begin_run(Rank::Now);
             (0..7).for_each(|block| keep(&blocks, run * 3 + block));
             let kept = blocks.kept();
             assert!(kept.bytes <= 1000 && kept.bytes == 100 * kept.entries.len());
@@ -392,7 +404,7 @@ mod tests {
     fn a_run_through_too_many_blocks_finds_some_again() {
         let blocks = DecodedBlocks::new(1000);
         for _ in 0..5 {
-            blocks.begin_run();
+            blocks.begin_run(Rank::Now);
             (0..40).for_each(|block| keep(&blocks, block));
             assert_eq!(kept(&blocks, 0..40), (0..10).collect::<Vec<_>>());
             assert!((0..10).all(|block| blocks.samples(&key(block)).is_some()));
@@ -404,10 +416,24 @@ mod tests {
         let blocks = DecodedBlocks::new(300);
         (0..3).for_each(|block| keep(&blocks, block));
         for run in 0..4 {
-            blocks.begin_run();
+            blocks.begin_run(Rank::Now);
             assert!(blocks.samples(&key(run % 2)).is_some());
         }
         keep(&blocks, 3);
         assert_eq!(kept(&blocks, 0..4), [0, 1, 3]);
+    }
+
+    #[test]
+    fn runs_ahead_replace_nothing() {
+        let blocks = DecodedBlocks::new(300);
+        (0..2).for_each(|block| keep(&blocks, block));
+        (0..3).for_each(|_| blocks.begin_run(Rank::Now));
+        blocks.begin_run(Rank::Ahead);
+        (2..9).for_each(|block| keep(&blocks, block));
+        assert_eq!(kept(&blocks, 0..9), [0, 1, 2], "one fits beside them");
+        blocks.begin_run(Rank::Now);
+        keep(&blocks, 9);
+        assert_eq!(kept(&blocks, 0..10).len(), 3);
+        assert!(blocks.samples(&key(9)).is_some());
     }
 }

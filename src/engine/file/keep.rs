@@ -1,7 +1,7 @@
 //! Decoding blocks of a file that keeps some decoded.
 
 use super::coefficient_file::CoefficientFile;
-use super::decoded::{BlockValues, DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey, FramesRead, PartsRead};
+use super::decoded::{BlockValues, DecodedBlock, DecodedBlocks, DecodedForm, DecodedKey, FramesRead, PartsRead, Rank};
 use std::ops::Range;
 use std::sync::Arc;
 use wavesplat_core::base::error::Result;
@@ -53,9 +53,12 @@ impl CoefficientFile {
 
     /// Begins a picture or a read of samples, which uses blocks that earlier ones decoded.
     pub fn begin_run(&self) {
-        if let Some(kept) = &self.kept {
-            kept.begin_run();
-        }
+        self.kept.iter().for_each(|kept| kept.begin_run(Rank::Now));
+    }
+
+    /// The same for what nobody waits for yet: it keeps only what fits beside all that is kept.
+    pub fn begin_run_ahead(&self) {
+        self.kept.iter().for_each(|kept| kept.begin_run(Rank::Ahead));
     }
 
     /// A block with the coefficients that are marked, if they have to be decoded together and `has_field` asks for them. Uses codes that

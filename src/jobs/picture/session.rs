@@ -35,6 +35,8 @@ pub struct Session {
     shared: Arc<Shared>,
     /// Bytes of memory that pictures may take.
     pub(super) memory: usize,
+    /// Whether nobody waits for the pictures yet.
+    is_ahead: bool,
 }
 
 #[derive(Debug)]
@@ -58,12 +60,12 @@ impl Shared {
 impl Session {
     /// A session that opens these inputs when it needs them. Pictures take up to `memory` bytes.
     pub fn new(inputs: Inputs, memory: usize) -> Self {
-        Self { shared: Shared::new(inputs, None, 0).into(), memory }
+        Self { shared: Shared::new(inputs, None, 0).into(), memory, is_ahead: false }
     }
 
     /// A session of a file that is open, opened from `inputs`.
     pub fn from_file(file: CoefficientFile, inputs: Inputs, memory: usize) -> Self {
-        Self { shared: Shared::new(inputs, Some(file), 0).into(), memory }
+        Self { shared: Shared::new(inputs, Some(file), 0).into(), memory, is_ahead: false }
     }
 
     /// The same inputs, for many pictures: up to a quarter of the memory holds blocks that stay decoded from one to the next,
@@ -75,12 +77,18 @@ impl Session {
         }
         let room = self.memory / KEPT_SHARE;
         let open = open.map(|file| file.keeping_decoded(room));
-        Self { shared: Shared::new(self.shared.inputs.clone(), open, room).into(), memory: self.memory - room }
+        let shared = Shared::new(self.shared.inputs.clone(), open, room).into();
+        Self { shared, memory: self.memory - room, is_ahead: self.is_ahead }
     }
 
     /// The same inputs for pictures that take up to `memory` bytes.
     pub fn with_memory(&self, memory: usize) -> Self {
-        Self { shared: self.shared.clone(), memory }
+        Self { memory, ..self.clone() }
+    }
+
+    /// The same inputs, for pictures that are made ahead: they take nothing from what others keep decoded.
+    pub(super) fn ahead(&self) -> Self {
+        Self { is_ahead: true, ..self.clone() }
     }
 
     /// The paths or addresses of the inputs.
@@ -107,7 +115,11 @@ impl Session {
     /// Those of opening it.
     pub(super) fn file(&self, skips_damaged: bool) -> Result<CoefficientFile> {
         let file = kept(&self.shared.open, || self.open_file())?;
-        file.begin_run();
+        if self.is_ahead {
+            file.begin_run_ahead();
+        } else {
+            file.begin_run();
+        }
         if !skips_damaged {
             return Ok(file);
         }

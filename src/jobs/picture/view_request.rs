@@ -48,6 +48,9 @@ pub struct ViewRequest {
     /// Whether to answer in few bytes, for slow networks.
     #[serde(default)]
     pub(super) packed: bool,
+    /// Whether nobody waits for the answer yet.
+    #[serde(default)]
+    pub(super) ahead: bool,
 }
 
 impl ViewRequest {
@@ -66,11 +69,13 @@ impl ViewRequest {
         Ok(request)
     }
 
-    /// The request for pictures that draws this, with the other settings of `base`.
+    /// The request for pictures that draws this, with the other settings of `base`. The page alone chooses the mode,
+    /// with its surfaces and slices.
     ///
     /// # Errors
     /// A base with paths that are no Unicode.
     pub fn applied_to(&self, base: &PictureRequest) -> Result<PictureRequest> {
+        let base = PictureRequest { mode: None, iso: None, slice: Vec::new(), ..base.clone() };
         Ok(PictureRequest { certify: self.certify, ..base.with(&self.look)? })
     }
 }

@@ -2,21 +2,23 @@
 
 use super::plan::Plan;
 use super::plan::config::{frames_of, render_config};
+use super::plan::modes::mode_name;
 use super::plan::opened::Opened;
-use super::plan::opening::opening_frame;
+use super::plan::opening::{Opening, opening_of};
 use super::plan::ranges::distribution;
 use super::plan::ranges::distribution_of_frames;
 use super::reporter::Caller;
 use super::request::{PictureRequest, option};
 use super::series::series_csv;
 use super::session::Session;
-use super::values::{PointSpec, ViewAngles};
+use super::values::{ModeName, PointSpec, ViewAngles};
 use super::view_request::ViewRequest;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 use wavesplat_core::base::address::public_name;
 use wavesplat_core::base::cancel::CancelToken;
+use wavesplat_core::base::choice::Choice;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::Output;
 use wavesplat_core::base::position::AxisPosition;
@@ -49,8 +51,9 @@ struct Facts {
     values: String,
     /// The time of each frame.
     labels: Vec<String>,
-    /// The frame that is shown first.
+    /// The frame and the mode that are shown first.
     opening: usize,
+    mode: &'static str,
     /// The point in the middle of the volume as it is drawn, and half of its diagonal.
     center: [f64; 3],
     radius: f64,
@@ -131,14 +134,15 @@ impl ViewerSession {
         let sides: [f64; 3] = std::array::from_fn(|axis| grid.spacing[axis] * grid.dims[axis] as f64);
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
         let frames = frames_of(&self.base, scene.frames().unwrap_or(0))?;
-        let opening = opening_frame(scene.as_mut(), file.as_deref(), &frames, self.session.memory, &Silent)?;
+        let opening = opening_of(scene.as_mut(), file.as_deref(), &frames, self.session.memory, &Silent)?;
         let name = self.session.paths().first().map(|input| public_name(input));
         let name = name.as_deref().and_then(Path::file_name);
         Ok(Facts {
             live: true,
             title: name.unwrap_or_default().to_string_lossy().into_owned(),
             labels: (0..scene.frames().unwrap_or(0)).map(|frame| annotation.stamp(frame)).collect(),
-            opening,
+            opening: opening.frame,
+            mode: self.first_mode(opening).name(),
             values: annotation.values,
             center: [0, 1, 2].map(middle),
             radius: sides.iter().map(|side| side * side).sum::<f64>().sqrt() / 2.0,
@@ -153,6 +157,12 @@ impl ViewerSession {
         })
     }
 
+    /// The mode that the viewer was started with, or else the one that shows its first frame best.
+    fn first_mode(&self, opening: Opening) -> ModeName {
+        let is_given = self.base.mode.is_some() || self.base.iso.is_some() || !self.base.slice.is_empty();
+        if is_given { mode_name(&self.base) } else { opening.mode }
+    }
+
     /// The pictures of a request: their description, then blocks of their numbers, as `engine/render/page/web/live.js`
     /// reads them.
     ///
@@ -160,7 +170,8 @@ impl ViewerSession {
     /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
     pub fn pictures(&self, view: &ViewRequest, work: &CancelToken) -> Result<Vec<u8>> {
         let request = view.applied_to(&self.base)?;
-        let mut plan = Plan::new(&self.session, &self.with_frames_for_colours(&request), &Caller(work))?;
+        let session = if view.ahead { self.session.ahead() } else { self.session.clone() };
+        let mut plan = Plan::new(&session, &self.with_frames_for_colours(&request), &Caller(work))?;
         let wanted = frames_of(&request, plan.scene.frames().unwrap_or(0))?;
         plan.config.frames.retain(|frame| wanted.binary_search(frame).is_ok());
         if plan.config.frames.is_empty() {

@@ -124,12 +124,18 @@ impl Canvas<'_> {
 pub(super) fn line(size: [f64; 2], from: [f64; 2], to: [f64; 2], thickness: f64, mut put: impl FnMut(i64, i64, f64)) {
     let along = [to[0] - from[0], to[1] - from[1]];
     let square = along[0] * along[0] + along[1] * along[1];
-    let ends = |i: usize| {
-        let (lo, hi) = (from[i].min(to[i]) - thickness - 1.0, from[i].max(to[i]) + thickness + 1.0);
-        lo.clamp(0.0, size[i]) as i64..hi.clamp(0.0, size[i]).ceil() as i64
+    let reach = thickness / 2.0 + 1.0;
+    let pixels = |low: f64, high: f64, i: usize| {
+        (low - reach).floor().clamp(0.0, size[i]) as i64..(high + reach).ceil().clamp(0.0, size[i]) as i64
     };
-    for y in ends(1) {
-        for x in ends(0) {
+    for y in pixels(from[1].min(to[1]), from[1].max(to[1]), 1) {
+        // The part of the line that is near this row.
+        let [one, other] = [-reach, reach].map(|off| {
+            let share = (y as f64 + 0.5 + off - from[1]) / along[1];
+            from[0] + share.clamp(0.0, 1.0) * along[0]
+        });
+        let [one, other] = if along[1] == 0.0 { [from[0], to[0]] } else { [one, other] };
+        for x in pixels(one.min(other), one.max(other), 0) {
             let at = [x as f64 + 0.5 - from[0], y as f64 + 0.5 - from[1]];
             let share =
                 if square > 0.0 { ((at[0] * along[0] + at[1] * along[1]) / square).clamp(0.0, 1.0) } else { 0.0 };

@@ -70,7 +70,12 @@ impl Planes {
     /// A block of the numbers as they are: little-endian floats of 32 bits.
     pub fn raw(&self) -> io::Result<Vec<u8>> {
         let mut bytes = headed(&self.head(0.0))?;
-        bytes.extend(self.planes.iter().flatten().flat_map(|number| number.to_le_bytes()));
+        for plane in &self.planes {
+            let start = bytes.len();
+            bytes.resize(start + size_of_val(plane.as_slice()), 0);
+            let places = bytes[start..].as_chunks_mut().0;
+            places.iter_mut().zip(plane).for_each(|(place, number)| *place = number.to_le_bytes());
+        }
         Ok(bytes)
     }
 

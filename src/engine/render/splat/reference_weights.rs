@@ -154,6 +154,9 @@ impl<'a> ReferenceWeights<'a> {
         let off = self.off(voxel, point);
         let centre = -(off[0] * bx + off[1] * by) / squared;
         let near = around(centre, std::f64::consts::SQRT_2 * reach / squared.sqrt(), all);
+        if near.is_empty() {
+            return 0.0;
+        }
         voxel[self.shear.axes[0]] = near.start;
         let (off, z) = (self.off(voxel, point), self.shear.depth(voxel));
         self.rows.sum(off, z, near.len())

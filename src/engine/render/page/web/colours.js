@@ -62,12 +62,11 @@ function paint(planes, kind, scale, background, pixels) {
 function paintValues(values, scale, background, pixels) {
   const { table } = scale;
   for (let i = 0, at = 0; i < values.length; i++, at += 4) {
-    const value = values[i], presence = value === value ? scale.presence(value) : 0;
+    const value = values[i], presence = value === value ? scale.presence(value) : 0, rest = 1 - presence;
     const entry = presence && 3 * Math.round(scale.share(value) * SHARES);
-    for (let c = 0; c < 3; c++) {
-      const behind = background[at + c];
-      pixels[at + c] = presence ? behind + presence * (table[entry + c] - behind) : behind;
-    }
+    pixels[at] = presence * table[entry] + rest * background[at];
+    pixels[at + 1] = presence * table[entry + 1] + rest * background[at + 1];
+    pixels[at + 2] = presence * table[entry + 2] + rest * background[at + 2];
   }
 }
 
@@ -91,26 +90,32 @@ function paintChannels(planes, scale, background, pixels) {
   }
 }
 
-// The lengths of the rays of all pixels, as shares of the longest one, as src/engine/render/ray_lengths.rs has them.
+// The lengths of the rays of all pixels, as shares of the longest one, as src/engine/render/ray_lengths.rs has them. Along a
+// row, the places where rays meet a side change evenly.
 function sharesOf({ from, right, down, along, ends, longest }, [width, height]) {
   const shares = new Float32Array(width * height);
   for (let y = 0, at = 0; y < height; y++) {
+    const sides = [0, 1, 2].map(a => {
+      const start = from[a] + y * down[a], met = ends[a].map(end => (end - start) / along[a]);
+      return along[a] === 0 ? [-Infinity, Infinity, 0] : [Math.min(...met), Math.max(...met), right[a] / along[a]];
+    });
+    const [[near0, far0, step0], [near1, far1, step1], [near2, far2, step2]] = sides;
     for (let x = 0; x < width; x++, at++) {
-      let near = -Infinity, far = Infinity;
-      for (let a = 0; a < 3; a++) {
-        const start = from[a] + x * right[a] + y * down[a], low = ends[a][0] - start, high = ends[a][1] - start;
-        if (along[a] === 0) {
-          if (low > 0 || high < 0) far = -Infinity;
-          continue;
-        }
-        const one = low / along[a], other = high / along[a];
-        near = Math.max(near, Math.min(one, other));
-        far = Math.min(far, Math.max(one, other));
-      }
+      const near = Math.max(near0 - x * step0, near1 - x * step1, near2 - x * step2);
+      const far = Math.min(far0 - x * step0, far1 - x * step1, far2 - x * step2);
       shares[at] = Math.min(Math.max(far - near, 0) / longest, 1);
     }
   }
+  for (const a of [0, 1, 2].filter(a => along[a] === 0)) removeBeside(shares, (x, y) => from[a] + x * right[a] + y * down[a], ends[a], width);
   return shares;
+}
+
+// Removes rays that pass beside two sides that they are parallel to.
+function removeBeside(shares, place, [low, high], width) {
+  for (let at = 0; at < shares.length; at++) {
+    const start = place(at % width, Math.floor(at / width));
+    if (start < low || start > high) shares[at] = 0;
+  }
 }
 
 // Values as if all rays were equally long (eq 51).

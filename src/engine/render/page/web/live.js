@@ -17,8 +17,9 @@ const FULL_PIXELS = 1280, SHARP_PIXELS = 4096; // most pixels along a side
 const DENSER = 1.2; // sharp pictures have this many times as many pixels along a side
 
 // Coarse pictures: the pixels of their longer side, and their level of detail. Each mode takes those that answer in time.
-const COARSER = [[288, 1], [288, 2], [192, 2], [128, 3]], FIRST = 1;
+const COARSER = [[288, 1], [288, 2], [192, 2], [128, 3]], FIRST = { composite: 2, iso: 2 }, ELSE = 1;
 const SOON = 25, LATE = 70; // milliseconds: two quicker answers make the next ones finer, two slower ones coarser
+const SLOWEST = 2 * LATE; // the full picture waits for coarse ones of the next frames unless one takes longer
 const SMOOTH = 60; // milliseconds that a full picture may take to be played
 
 class Stale extends Error {}
@@ -38,6 +39,7 @@ class Live {
     };
     this.about = this.first;
     this.opening = facts.opening;
+    this.firstMode = facts.mode === 'projection' ? 'mean' : facts.mode;
     this.sequences = [{ label: '', pictures: facts.labels.map((_, frame) => ({ view: 0, frame })) }];
     this.look = { mode: 'mean', slices: [], iso: [], opacity: null, range: null, shade: false, annotate: 'box,axes', ...this.home() };
     this.known = {}; // automatic colours and opacities of each mode, from its first full answer, or a coarse one until then
@@ -58,7 +60,7 @@ class Live {
     const { mode, view, center, zoom, slices, opacity, shade, annotate, theme } = this.look, home = this.home();
     const unless = (value, first) => String(value) === String(first) ? null : String(value);
     return {
-      mode: unless(mode, 'mean'), view: unless(view, home.view), center: unless(texts(center), texts(home.center)), zoom: unless(short(zoom), 1),
+      mode: unless(mode, this.firstMode), view: unless(view, home.view), center: unless(texts(center), texts(home.center)), zoom: unless(short(zoom), 1),
       iso: mode === 'iso' ? this.isoShare : null, slices: mode === 'slice' ? slices.map(([axis, share]) => `${axis}:${short(share)}`).join() : null,
       opacity: opacity?.map(point => point.join(':')).join(), shade: shade ? 1 : null, box: annotate ? null : 0, white: theme ? 1 : null,
     };
@@ -78,10 +80,12 @@ class Live {
 
   fullSize() { return this.screenSize(FULL_PIXELS); }
 
+  rung(mode) { return this.coarser[mode] ?? FIRST[mode] ?? ELSE; }
+
   // Width and height of a picture, and its level of detail.
   measures(quality) {
     if (quality !== COARSE) return { size: quality === SHARP ? this.screenSize(SHARP_PIXELS) : this.fullSize(), lod: 0 };
-    const [pixels, lod] = COARSER[this.coarser[this.look.mode] ?? FIRST], full = this.fullSize(), part = Math.min(1, pixels / Math.max(...full));
+    const [pixels, lod] = COARSER[this.rung(this.look.mode)], full = this.fullSize(), part = Math.min(1, pixels / Math.max(...full));
     return { size: full.map(side => Math.max(1, Math.round(side * part))), lod: Math.min(this.facts.coarsest, lod) };
   }
 
@@ -157,7 +161,7 @@ class Live {
       if (wanted !== this.wanted) return;
       const picture = await this.wantedPicture(quality, index, isPlaying, wanted).catch(error => this.orNone(error, quality));
       if (picture && (wanted === this.wanted || this.isMoving)) yield picture;
-      if (quality === COARSE && step && !isPlaying && this.coarseTime <= LATE) await this.loadNext(index, step, wanted);
+      if (quality === COARSE && step && !isPlaying && this.coarseTime <= SLOWEST) await this.loadNext(index, step, wanted);
     }
     if (wanted !== this.wanted || this.isMoving) return;
     if (isPlaying) this.playAhead(qualities[0], index);
@@ -246,7 +250,8 @@ class Live {
 
   async ask(key, frames, quality) {
     const { mode, range } = this.look, colours = this.colourKey(quality), isChosen = mode === 'composite' && range, begun = performance.now();
-    const answer = await this.post('pictures', this.request(frames, quality), this.underWay.stop.signal, this.underWay.rank);
+    const { stop, rank } = this.underWay, ahead = rank !== USER;
+    const answer = await this.post('pictures', { ...this.request(frames, quality), ahead }, stop.signal, rank);
     const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer()), ended = performance.now();
     if (bytes.length > 2 ** 20 && bytes.length / (ended - started) * 1000 < SLOW) this.isSlow = true;
     if (!this.underWay?.waits) this.learnPace(mode, quality, (ended - begun) / (frames[1] - frames[0]), frames); // not for what was stopped
@@ -260,8 +265,8 @@ class Live {
     about.mode = this.lacksErrors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
     if (!isChosen) this.learnColours(colours, about, quality);
-    const kept = this.remembered(key), backdrop = about.backdrops[0] ? await pixelsOf(about.backdrops[0], about.size) : null;
-    const shares = about.rays[0] && sharesOf(about.rays[0], about.size);
+    const kept = this.remembered(key), decoding = about.backdrops[0] ? pixelsOf(about.backdrops[0], about.size) : null;
+    const shares = about.rays[0] && sharesOf(about.rays[0], about.size), backdrop = await decoding;
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
       const { pictures } = await readBlock(bytes.subarray(at, at += size));
@@ -285,7 +290,7 @@ class Live {
     if (quality === FULL) this.pace[mode] = milliseconds;
     if (quality !== COARSE || end - first > 1) return;
     this.coarseTime = milliseconds;
-    const n = this.coarser[mode] ?? FIRST, two = [milliseconds, this.lastPace[mode] ?? (SOON + LATE) / 2];
+    const n = this.rung(mode), two = [milliseconds, this.lastPace[mode] ?? (SOON + LATE) / 2];
     const by = Math.min(...two) > LATE ? 1 : Math.max(...two) < SOON ? -1 : 0;
     this.coarser[mode] = clamped(n + by, 0, COARSER.length - 1);
     this.lastPace[mode] = by ? undefined : milliseconds;

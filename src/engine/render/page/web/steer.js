@@ -47,7 +47,8 @@ class Steering {
   // Takes up the state of the address.
   restore() {
     const { mode, view, center, zoom, iso, slices, opacity, shade, box, white } = Address.read(), share = text => clamped(Number(text) || 0, 0, 1);
-    this.mode = mode ?? 'mean';
+    this.mode = this.live.firstMode;
+    this.mode = mode; // stays if there is no such mode
     const angles = numbersIn(view, 2), middle = numbersIn(center, 3), [factor] = numbersIn(zoom, 1) ?? [], [place] = numbersIn(iso, 1) ?? [];
     if (angles) this.live.look.view = turned(angles, [0, 0], 1);
     if (middle) this.live.look.center = middle;

@@ -71,7 +71,7 @@ async function pixelsOf(address, size) {
   await image.decode();
   const canvas = document.createElement('canvas');
   [canvas.width, canvas.height] = size;
-  const context = canvas.getContext('2d');
+  const context = canvas.getContext('2d', { willReadFrequently: true });
   context.drawImage(image, 0, 0);
   return context.getImageData(0, 0, ...size).data;
 }

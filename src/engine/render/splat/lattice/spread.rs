@@ -146,10 +146,27 @@ impl Placed {
         scratch.single.sums = sums;
     }
 
-    /// The cells of the value 1 at all voxels, in f64.
+    /// The cells of the value 1 at all voxels, in f64: those of a slice are the cells of a row times those of a column.
     fn spread_ones(&self) -> Aligned<f64> {
-        let ones = vec![1.0; self.region.voxels()];
-        self.spread(&BlockValues { values: &ones, middle: 0.0, scale: 1.0, largest: 1.0 }, &mut BlockScratch::default())
+        let mut sums = Aligned::zeros(self.rectangle.area());
+        for slice in &self.slices {
+            let row = self.cells_of_ones(0, slice.cell[0], &slice.along);
+            let column = self.cells_of_ones(1, slice.cell[1], &slice.across);
+            dispatch!(add_product(&self.rectangle, &row, &column, &mut sums[..]));
+        }
+        sums
+    }
+
+    /// The cells, and their sums, of the value 1 at all voxels along u (0) or v (1), of which the first reaches `cell`.
+    fn cells_of_ones(&self, i: usize, cell: isize, weights: &CellWeights) -> Vec<(isize, f64)> {
+        let Shear { fineness, .. } = self.spreading.shear;
+        let mut sums = vec![0.0; fineness * self.count[i].saturating_sub(1) + weights.len()];
+        for n in 0..self.count[i] {
+            let fading = self.fading[i].get(n).copied().unwrap_or(1.0);
+            let reached = &mut sums[n * fineness..];
+            reached.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += fading * weight);
+        }
+        (cell..).zip(sums).filter(|(_, sum)| *sum != 0.0).collect()
     }
 
     /// The block's own cells.
@@ -227,6 +244,28 @@ fn rectangle_of(slices: &[Slice], spreading: &Spreading, count: [usize; 2]) -> R
     };
     let (u, v) = (range(0), range(1));
     Rectangle::holding([u.0, v.0], [u.1, v.1], q)
+}
+
+/// Adds the products of a row of cells and a column of cells.
+#[inline(always)]
+fn add_product(rectangle: &Rectangle, row: &[(isize, f64)], column: &[(isize, f64)], sums: &mut [f64]) {
+    let mut cells = vec![0.0; rectangle.size[0]];
+    for (u, sum) in row {
+        rectangle.in_row(*u).into_iter().for_each(|at| cells[at] = *sum);
+    }
+    let of_phase = |at: usize| {
+        let phase = &cells[at..at + rectangle.run];
+        let end = phase.iter().rposition(|sum| *sum != 0.0).map_or(0, |last| last + 1);
+        at + phase.iter().position(|sum| *sum != 0.0).unwrap_or(0)..at + end
+    };
+    let phases: Vec<Range<usize>> = (0..cells.len()).step_by(rectangle.run.max(1)).map(of_phase).collect();
+    for (v, weight) in column {
+        let Some(all) = rectangle.row(*v) else { continue };
+        for here in phases.iter().filter(|here| here.start < here.end) {
+            let sums = &mut sums[all.start + here.start..all.start + here.end];
+            sums.iter_mut().zip(&cells[here.clone()]).for_each(|(sum, cell)| *sum += weight * cell);
+        }
+    }
 }
 
 #[inline(always)]
