@@ -87,8 +87,9 @@
 //! | `jobs` | `extract` | a coefficient file back to samples and to files of other programs |
 //! | | `picture` | a request for pictures, resolved and carried out, for the programs, the viewer and Python |
 //! | `cli` | | the options and commands of the programs in `bin/`, and the server of the viewer |
+//! | `web` | | the viewer's answers as WebAssembly, for pages without a server |
 //!
-//! `formats` and `engine` use `core` but not each other; `jobs` uses all three, and `cli` all four. The bytes of a coefficient
+//! `formats` and `engine` use `core` but not each other; `jobs` uses all three, `cli` and `web` all four. The bytes of a coefficient
 //! file are a package beside `src/`, [`wavesplat-format`](mod@format). [`method`] explains the mathematics.
 //!
 //! # From a request to a pixel
@@ -119,6 +120,7 @@
 //! | an option of pictures, a mode | `jobs/picture/mod.rs` |
 //! | a format of files | `formats/lib.rs` |
 //! | a temporal basis | `core/wavelet/mod.rs` |
+//! | a question of the viewer's page | `jobs/picture/question.rs` |
 //!
 //! # Words
 //!
@@ -145,7 +147,7 @@
 //! - `wavelet`, `codec` and `view`, and the kernels in `engine/render/splat`, are functions over slices: they open no file,
 //!   look at no clock and start no thread but those of rayon. `core/codec/buffer.rs` alone has a state: it reuses memory.
 //! - Crates that do input, output or threads are used only in the files that `tests/layering.rs` lists for them.
-//! - All `unsafe` code is in `core/base/mapped.rs`.
+//! - `unsafe` code is at the edges: maps and signals in `core/base/mapped`, and JavaScript in `web/host.rs` and `web/exports.rs`.
 //!
 //! These rules are not checked by that test:
 //!

@@ -30,6 +30,8 @@ pub(crate) enum Fate {
     Replaced(Vec<u8>, String),
     /// The ETag is left out.
     Nameless,
+    /// Another file comes, of this type.
+    Other(Vec<u8>, &'static str),
     /// Bytes come that are no HTTP.
     Nonsense,
     /// More bytes come than are announced, without a length.
@@ -198,6 +200,10 @@ fn answer(mut out: &TcpStream, bytes: &[u8], asked: &Asked, fate: Fate) -> Optio
         Fate::Replaced(others, etag) => {
             let range = range.start.min(others.len())..range.end.min(others.len());
             send(out, &head(&range, others.len(), &format!("ETag: {etag}\r\n")), &others[range.clone()])
+        }
+        Fate::Other(others, kind) => {
+            let head = format!("HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n", others.len());
+            send(out, &head, &others)
         }
         Fate::Nonsense => {
             send(out, "220 mail server ready\r\n", &[]);

@@ -176,7 +176,8 @@ fn a_signal_while_a_file_is_saved_leaves_nothing() {
         fs::create_dir_all(work.path("tmp")).unwrap();
         let mut served = Served::start_interruptible(&work, "a.wspl --threads 1");
         let body = String::from_utf8(pictures(900)).unwrap().replace("0:12", "0:120");
-        let (path, mut stream) = (served.path(&format!("save?file={file}")), served.connect());
+        let body = body.replacen('{', &format!(r#"{{"file":"{file}","#), 1);
+        let (path, mut stream) = (served.path("save"), served.connect());
         let head = format!("POST {path} HTTP/1.1\r\nHost: {}\r\nContent-Length: {}\r\n\r\n", served.host(), body.len());
         stream.write_all(format!("{head}{body}").as_bytes()).unwrap();
         let begin = Instant::now();

@@ -97,7 +97,11 @@ fn wrong_requests_get_their_reason_and_no_picture() {
         assert!(answer.head.contains("text/plain") && text.len() < 1000, "{text}");
     }
     assert_eq!(served.post("pictures", &vec![b' '; 1 << 20]).status, 400);
-    assert_eq!(served.post("save?file=../a.png", &bytes(&request())).status, 400);
+    let mut elsewhere = request();
+    elsewhere["file"] = json!("../a.png");
+    for question in ["save", "command", "pages", "%2e%2e"] {
+        assert_eq!(served.post(question, &bytes(&elsewhere)).status, 400, "{question}");
+    }
     assert_eq!(served.post("series", b"[1,2]").status, 400);
     assert_eq!(served.post("pictures", &bytes(&request())).body, good.body, "and goes on as before");
 }

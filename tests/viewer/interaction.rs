@@ -138,7 +138,7 @@ fn opacities_are_drawn_by_hand() {
     browser.wait(FULL);
     let (_, after) = browser.picture();
     assert!(before != after);
-    let command = browser.js("steering.live.made('command', 'picture.png').then(answer => answer.text())");
+    let command = browser.js("steering.live.made('command', 'picture.png').then(textOf)");
     assert!(command.as_str().unwrap().contains("--opacity=0:0,0.5:1,1:1"), "{command}");
 }
 

@@ -10,6 +10,7 @@ mod pixels_match_program; // pixels of the page are those of `wavesplat-render`
 mod random_actions; // a thousand actions, reloads and links
 mod request_priority; // which request is answered first
 mod running_viewer; // helper: a running `wavesplat view`
+mod whole_pages; // pages that need no server
 
 use crate::cli::{Archive, Work};
 

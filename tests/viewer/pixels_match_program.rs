@@ -21,7 +21,7 @@ fn assert_agrees(browser: &mut Browser, work: &Work, frame: usize, what: &str) {
 /// Asserts that the copied command draws what is shown.
 #[track_caller]
 pub(super) fn assert_shown(browser: &mut Browser, work: &Work, what: &str) {
-    let command = browser.js("steering.live.made('command', 'picture.png').then(answer => answer.text())");
+    let command = browser.js("steering.live.made('command', 'picture.png').then(textOf)");
     let command = command.as_str().unwrap();
     work.shell(&format!("{} --force", command.replacen("wavesplat-render", "$RENDER", 1))).ok();
     let (size, found) = browser.picture();
@@ -90,8 +90,8 @@ fn certified_errors_hold_for_the_pictures() {
     let raw = Served::start(&work, "a.npy");
     browser.open(&raw.address);
     let read = format!(
-        "steering.live.post('pictures', {{ look: {{ ...{}, range: null, clear: null }} }}).then(a => a.arrayBuffer()).then(async b => \
-         Array.from((await readBlock(new Uint8Array(b).subarray(4 + new DataView(b).getUint32(0, true)))).pictures[0][0], v => Number.isNaN(v) ? null : v))",
+        "steering.live.engine.ask('pictures', {{ look: {{ ...{}, range: null, clear: null }} }}).then(async b => \
+         Array.from((await readBlock(b.subarray(4 + new DataView(b.buffer).getUint32(0, true)))).pictures[0][0], v => Number.isNaN(v) ? null : v))",
         look.as_str().unwrap()
     );
     let exact = browser.js(&read);

@@ -67,7 +67,7 @@ fn plotting_does_not_change_the_frame() {
         browser.js("[player.index, steering.live.index, document.documentElement.dataset.filled]"),
         json!([5, 5, "5"])
     );
-    let command = browser.js("steering.live.made('command', 'picture.png').then(answer => answer.text())");
+    let command = browser.js("steering.live.made('command', 'picture.png').then(textOf)");
     assert!(command.as_str().unwrap().contains("--frames=5 "), "{command}");
     browser.key("d");
     assert_eq!(browser.js("[player.series, element('series').hidden]"), json!([null, true]), "another view");

@@ -6,6 +6,7 @@ mod convert;
 mod extract;
 mod info;
 mod merge;
+mod page;
 mod recover;
 mod results;
 mod scan;
@@ -30,6 +31,7 @@ Examples:
   wavesplat append run.wspl more/
   wavesplat info run.wspl
   wavesplat view run.wspl
+  wavesplat page run.wspl -o run.html
   wavesplat verify run.wspl --against frames/
   wavesplat extract run.wspl --frames 10:20 -o part.npy
   wavesplat recover damaged.wspl -o saved.wspl
@@ -54,6 +56,7 @@ enum Command {
     Merge(merge::MergeArgs),
     #[cfg(feature = "view")]
     View(view::ViewArgs),
+    Page(page::PageArgs),
     /// Write completions for a shell, or man pages
     #[command(
         subcommand,
@@ -83,6 +86,7 @@ impl Cli {
             Command::Merge(args) => merge::run(&args),
             #[cfg(feature = "view")]
             Command::View(args) => view::run(&args),
+            Command::Page(args) => page::run(&args),
             Command::Generate(args) => args.run(generate::command::<Self>()),
         }
     }

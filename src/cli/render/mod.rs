@@ -10,8 +10,9 @@ use args::Cli;
 use clap::Parser;
 pub use generate::Program;
 use std::ffi::OsString;
+use std::path::PathBuf;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_jobs::picture::{self, PictureRequest, Session};
+use wavesplat_jobs::picture::{self, PictureRequest, Session, ViewerSession, is_coefficient_name};
 
 /// The meaning of the words after `wavesplat-render`.
 pub struct Parsed {
@@ -33,6 +34,24 @@ pub fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Parsed> {
     let program = Program::try_parse_from(words).map_err(|e| Error::usage(first_line(&e.to_string())))?;
     let Program::Render(cli) = program else { return Err(Error::usage("--generate: shows no pictures")) };
     Ok(Parsed { session: cli.session()?, request: cli.request(), input_words: cli.input_words() })
+}
+
+/// A viewer of a coefficient file or of frames, with more options of `wavesplat-render`.
+///
+/// # Errors
+/// Words that are no options, or that have no place in a viewer.
+pub fn viewer_session(
+    inputs: &[PathBuf],
+    memory: usize,
+    options: impl IntoIterator<Item = OsString>,
+) -> Result<ViewerSession> {
+    let method = if inputs.iter().all(|path| is_coefficient_name(path)) { "coefficients" } else { "direct" };
+    let mut words = vec![format!("--method={method}").into(), format!("--memory={memory}").into()];
+    words.extend(options);
+    words.extend(["-o".into(), "live.html".into(), "--".into()]);
+    words.extend(inputs.iter().map(OsString::from));
+    let Parsed { session, request, input_words } = parsed(words)?;
+    Ok(ViewerSession::new(&session, request, input_words))
 }
 
 impl Cli {

@@ -6,7 +6,8 @@ mod connections;
 mod guard;
 mod server;
 
-use crate::{CommonArgs, RemoteArgs, render};
+use crate::render::viewer_session;
+use crate::{CommonArgs, RemoteArgs};
 use clap::Args;
 use server::{Server, Stop};
 use std::ffi::OsString;
@@ -14,7 +15,7 @@ use std::net::{IpAddr, Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::{io, thread};
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_jobs::picture::{ViewerSession, is_coefficient_name};
+use wavesplat_jobs::picture::ViewerSession;
 
 /// Look around in a browser: turn, zoom, play, choose colours
 ///
@@ -128,22 +129,4 @@ impl ViewArgs {
         let options = self.remote.words().into_iter().chain(self.options.iter().cloned());
         viewer_session(&self.inputs, self.common.memory.0, options)
     }
-}
-
-/// A viewer of a coefficient file or of frames, with more options of `wavesplat-render`.
-///
-/// # Errors
-/// Words that are no options, or that have no place in a viewer.
-pub fn viewer_session(
-    inputs: &[PathBuf],
-    memory: usize,
-    options: impl IntoIterator<Item = OsString>,
-) -> Result<ViewerSession> {
-    let method = if inputs.iter().all(|path| is_coefficient_name(path)) { "coefficients" } else { "direct" };
-    let mut words = vec![format!("--method={method}").into(), format!("--memory={memory}").into()];
-    words.extend(options);
-    words.extend(["-o".into(), "live.html".into(), "--".into()]);
-    words.extend(inputs.iter().map(OsString::from));
-    let render::Parsed { session, request, input_words } = render::parsed(words)?;
-    Ok(ViewerSession::new(&session, request, input_words))
 }

@@ -5,7 +5,7 @@ use super::connections::{Connection, Connections, PATIENCE, Patient};
 use super::guard;
 use axum::Router;
 use axum::body::{Body, Bytes, to_bytes};
-use axum::extract::{Query, Request, State};
+use axum::extract::{Path, Request, State};
 use axum::http::{HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
@@ -13,7 +13,6 @@ use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use std::collections::HashMap;
 use std::convert::Infallible;
 use std::io;
 use std::net::TcpListener;
@@ -23,7 +22,7 @@ use tokio::sync::{Notify, Semaphore};
 use tower_service::Service;
 use wavesplat_core::base::cancel::CancelToken;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_jobs::picture::{Saved, ViewRequest, ViewerSession};
+use wavesplat_jobs::picture::{Question, ViewerSession};
 
 /// Most bytes of a request.
 const MOST_BYTES: usize = 64 << 10;
@@ -101,12 +100,8 @@ impl Server {
         let at = |name: &str| format!("/{}/{name}", self.token);
         let pages = Router::new()
             .route(&at(""), get(page))
-            .route(&at("pictures"), post(pictures))
             .route(&at("progress"), get(progress))
-            .route(&at("histogram"), get(histogram))
-            .route(&at("series"), post(series))
-            .route(&at("command"), post(command))
-            .route(&at("save"), post(save));
+            .route(&at("{question}"), post(answer));
         pages.with_state(self.clone())
     }
 
@@ -207,63 +202,19 @@ async fn page(State(server): Shared) -> std::result::Result<Html<String>, Failed
     ViewerSession::page(&server.facts, &nonce).map(Html).map_err(failed)
 }
 
-async fn pictures(State(server): Shared, body: Bytes) -> std::result::Result<Response, Failed> {
-    let request = view_request(&body)?;
-    let pictures = server.render(move |session, work| session.pictures(&request, work)).await?;
-    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], pictures).into_response())
-}
-
 /// How much of the present work is done, 0 to 1.
 async fn progress(State(server): Shared) -> String {
     server.work.lock().unwrap_or_else(PoisonError::into_inner).share().to_string()
 }
 
-/// The time series of a point, given as three shares of the axes.
-async fn series(State(server): Shared, body: Bytes) -> std::result::Result<Bytes, Failed> {
-    let refused = |e: serde_json::Error| Failed(StatusCode::BAD_REQUEST, format!("not a point: {e}"));
-    let point: [f64; 3] = serde_json::from_slice(&body).map_err(refused)?;
-    server.render(move |session, work| session.series(point, work)).await
-}
-
-/// The histogram of the samples of some frames, or of the requested frame.
-async fn histogram(
-    State(server): Shared,
-    Query(query): Query<HashMap<String, String>>,
-) -> std::result::Result<Response, Failed> {
-    let number = |text: &String| text.parse().map_err(|_| Failed(StatusCode::BAD_REQUEST, "frame: no number".into()));
-    let frame = query.get("frame").map(number).transpose()?;
-    let failed = |e: serde_json::Error| Error::setting("histogram", e.to_string());
-    let text = move |session: &ViewerSession, work: &CancelToken| {
-        serde_json::to_vec(&session.histogram(frame, work)?).map_err(failed)
+/// Answers a question of the page.
+async fn answer(State(server): Shared, Path(name): Path<String>, body: Bytes) -> std::result::Result<Response, Failed> {
+    let refused = |e: Error| Failed(StatusCode::BAD_REQUEST, e.to_string());
+    let question = Question::read(&name, &body).map_err(refused)?;
+    let answer = if question.is_quick() {
+        server.session.answer(&question, &CancelToken::default()).map_err(refused)?.into()
+    } else {
+        server.render(move |session, work| session.answer(&question, work)).await?
     };
-    Ok(([(header::CONTENT_TYPE, "application/json")], server.render(text).await?).into_response())
-}
-
-async fn command(
-    State(server): Shared,
-    Query(query): Query<HashMap<String, String>>,
-    body: Bytes,
-) -> std::result::Result<String, Failed> {
-    let (request, saved) = (view_request(&body)?, saved(&query)?);
-    server.session.command(&request, saved).map_err(|e| Failed(StatusCode::BAD_REQUEST, e.to_string()))
-}
-
-async fn save(
-    State(server): Shared,
-    Query(query): Query<HashMap<String, String>>,
-    body: Bytes,
-) -> std::result::Result<Response, Failed> {
-    let (request, saved) = (view_request(&body)?, saved(&query)?);
-    let file = server.render(move |session, work| session.save(&request, saved, work)).await?;
-    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], file).into_response())
-}
-
-fn view_request(body: &[u8]) -> std::result::Result<ViewRequest, Failed> {
-    ViewRequest::read(body).map_err(|e| Failed(StatusCode::BAD_REQUEST, e.to_string()))
-}
-
-/// The kind of the requested file.
-fn saved(query: &HashMap<String, String>) -> std::result::Result<Saved, Failed> {
-    let known = query.get("file").and_then(|name| Saved::named(name));
-    known.ok_or_else(|| Failed(StatusCode::BAD_REQUEST, "file: picture.png, page.html or movie.mp4".into()))
+    Ok(([(header::CONTENT_TYPE, "application/octet-stream")], answer).into_response())
 }

@@ -2,9 +2,9 @@
 //! something: such paths are refused before they are opened, wherever they come from.
 
 use super::error::{Error, Result};
+use super::system::FileTypeExt;
 use std::fs::{self, File, FileType};
 use std::io::Read;
-use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
 /// Opens a regular file for reading.

@@ -96,12 +96,12 @@ impl Region {
     /// Number of voxels.
     #[inline]
     pub fn voxels(&self) -> usize {
-        self.dims().iter().product()
+        self.dims().into_iter().fold(1, usize::saturating_mul)
     }
 
     /// Whether the region has no voxel.
     pub fn is_empty(&self) -> bool {
-        self.voxels() == 0
+        self.dims().contains(&0)
     }
 
     /// The voxels in both regions.

@@ -2,6 +2,8 @@
 //!
 //! Nothing here depends on frames, coefficients or pictures. A module uses only those listed above it.
 
+#[doc(hidden)]
+pub mod system;
 mod remedy;
 pub mod error;
 pub mod progress;

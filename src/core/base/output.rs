@@ -12,17 +12,17 @@ pub use unfinished::{Helper, abandon};
 
 use crate::base::address::refuse_output;
 use crate::base::error::{Error, Note, Remedy, Result};
+use crate::base::system::{FileExt, Instant, MetadataExt, PermissionsExt};
 use lock::locked;
 use std::ffi::OsString;
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, IsTerminal, Seek, SeekFrom, Stdout, Write};
-use std::os::unix::fs::{FileExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use unfinished::AllUnfinished;
 
 /// The name that stands for a standard stream.
@@ -286,7 +286,9 @@ impl Part {
             }
             if let Ok(replaced) = fs::metadata(path) {
                 let mode = replaced.permissions().mode() | 0o200; // it must be writable
-                file.set_permissions(Permissions::from_mode(mode)).map_err(failed)?;
+                let mut permissions = replaced.permissions();
+                permissions.set_mode(mode);
+                file.set_permissions(permissions).map_err(failed)?;
             }
             return Ok((file, Self::new(part, replace, unfinished)));
         }

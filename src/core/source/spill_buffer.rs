@@ -1,9 +1,9 @@
 //! Bytes of decoded or piped frames: in memory, or in a temporary file if they are too many.
 
 use crate::base::error::{Error, Result};
+use crate::base::system::FileExt;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::Arc;
 

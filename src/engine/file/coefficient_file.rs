@@ -170,6 +170,16 @@ impl CoefficientFile {
         self.reader.storage().len()
     }
 
+    /// All its bytes.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub fn stored(&self) -> Result<Vec<u8>> {
+        let mut all = vec![0; usize::try_from(self.bytes()).unwrap_or(usize::MAX)];
+        let read = self.reader.storage().read_at(0, &mut all);
+        read.map(|()| all).map_err(|e| Error::CoefficientFile { path: self.path.clone(), source: e.into() })
+    }
+
     /// The source's description; `None` if the file has none.
     ///
     /// # Errors

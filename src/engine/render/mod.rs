@@ -76,9 +76,10 @@ use planes::Planes;
 use projection::Projection;
 use renderer::{Output, Renderer, check_memory};
 use slices::{Composite, Isosurfaces, Largest, Sliced};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::system::Instant;
 
 /// What renders the mode of `config`.
 fn renderer<'a>(scene: &dyn Scene, config: &'a RenderConfig) -> Result<Box<dyn Renderer + 'a>> {

@@ -1,7 +1,7 @@
 //! Reports of a rendering: its pictures, counts and times.
 
 use serde::Serialize;
-use std::time::Instant;
+use wavesplat_core::base::system::Instant;
 use wavesplat_core::view::camera::{Camera, View};
 
 /// A finished picture: `width * height` pixels, row by row, each with [`Pixel::numbers`](super::Pixel::numbers)

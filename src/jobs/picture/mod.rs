@@ -35,14 +35,20 @@ mod series;
 mod run;
 mod view_request;
 mod viewer;
+mod question;
+#[cfg(not(target_family = "wasm"))] // it holds the program for browsers
+mod whole_page;
 
+pub use question::Question;
 pub use report::Outcome;
 pub use reporter::{Caller, Reporter};
 pub use request::PictureRequest;
 pub use run::run;
 pub use session::{Inputs, Session};
 pub use view_request::ViewRequest;
-pub use viewer::{Saved, ViewerSession};
+pub use viewer::ViewerSession;
+#[cfg(not(target_family = "wasm"))]
+pub use whole_page::{write_page, write_site};
 
 pub use plan::named_colours::{colours_of_source, open_colours};
 pub use request::{MOST_VIEWS, check_fps, check_speed, exclude, is_field};

@@ -150,6 +150,9 @@ impl Session {
 
     /// Opens the frames, and reports how they are read.
     pub(super) fn open_frames(&self, reporter: &dyn Reporter) -> Result<Box<dyn FrameSource>> {
+        if cfg!(target_family = "wasm") {
+            return Err(Error::input(&self.paths()[0], "this page reads coefficient files only"));
+        }
         let source = formats::open(&self.shared.inputs.paths, &self.shared.inputs.frames)?;
         source.archive().notes.iter().for_each(|note| reporter.note_source(note));
         Ok(source)
@@ -187,6 +190,9 @@ fn hint_at_frames(path: &Path, error: Error) -> Error {
 
 /// Whether a path has the name of a coefficient file: on a server, any that is not one of frames.
 pub fn is_coefficient_name(path: &Path) -> bool {
+    if cfg!(target_family = "wasm") {
+        return true; // a browser reads no frames
+    }
     let name = public_name(path);
     let ending = name.extension().and_then(OsStr::to_str).unwrap_or_default();
     ending == "wspl" || is_address(path) && !formats::extensions().any(|of_frames| of_frames == ending)

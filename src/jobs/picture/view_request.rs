@@ -51,6 +51,8 @@ pub struct ViewRequest {
     /// Whether nobody waits for the answer yet.
     #[serde(default)]
     pub(super) ahead: bool,
+    /// The file that is asked for, if one is.
+    pub(super) file: Option<Saved>,
 }
 
 impl ViewRequest {
@@ -77,6 +79,30 @@ impl ViewRequest {
     pub fn applied_to(&self, base: &PictureRequest) -> Result<PictureRequest> {
         let base = PictureRequest { mode: None, iso: None, slice: Vec::new(), ..base.clone() };
         Ok(PictureRequest { certify: self.certify, ..base.with(&self.look)? })
+    }
+}
+
+/// A kind of file that the page saves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub enum Saved {
+    /// One picture.
+    #[serde(rename = "picture.png")]
+    Picture,
+    /// A page of all frames.
+    #[serde(rename = "page.html")]
+    Page,
+    /// A movie of all frames.
+    #[serde(rename = "movie.mp4")]
+    Movie,
+}
+
+impl Saved {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Picture => "picture.png",
+            Self::Page => "page.html",
+            Self::Movie => "movie.mp4",
+        }
     }
 }
 

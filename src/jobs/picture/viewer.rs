@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use super::plan::config::{frames_of, render_config};
-use super::plan::modes::mode_name;
+use super::plan::modes::{self, mode_name};
 use super::plan::opened::Opened;
 use super::plan::opening::{Opening, opening_of};
 use super::plan::ranges::distribution;
@@ -12,8 +12,9 @@ use super::request::{PictureRequest, option};
 use super::series::series_csv;
 use super::session::Session;
 use super::values::{ModeName, PointSpec, ViewAngles};
-use super::view_request::ViewRequest;
+use super::view_request::{Saved, ViewRequest};
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
 use wavesplat_core::base::address::public_name;
@@ -33,8 +34,8 @@ use wavesplat_engine::render::{Mode, Pixel, render};
 /// A viewer: open inputs, and the settings that no request of the page changes.
 #[derive(Debug)]
 pub struct ViewerSession {
-    session: Session,
-    base: PictureRequest,
+    pub(super) session: Session,
+    pub(super) base: PictureRequest,
     /// Words for how the inputs are opened.
     input_words: Vec<String>,
     /// Bytes of memory for answers.
@@ -70,6 +71,27 @@ struct Facts {
     /// Most numbers of an answer.
     numbers: usize,
     maps: BTreeMap<String, String>,
+    /// Where a page without a server finds the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<FileOfPage>,
+}
+
+/// A file that a page opens by itself.
+#[derive(Debug, Serialize)]
+pub(super) struct FileOfPage {
+    /// Its name.
+    pub(super) name: String,
+    /// Its address, and that of the program, if they are not within the page.
+    pub(super) url: Option<String>,
+    pub(super) program: Option<String>,
+    /// Its length in bytes.
+    pub(super) length: u64,
+    /// The settings of all pictures.
+    pub(super) request: PictureRequest,
+    /// What an answer would say of the first picture, with its automatic colours: they take longer than the picture.
+    pub(super) first: Option<Value>,
+    /// Bytes of memory for coarse pictures, and for others.
+    pub(super) memory: [usize; 2],
 }
 
 /// The head of an answer, which comes before its blocks.
@@ -86,7 +108,7 @@ struct Answer<'a> {
 
 /// A histogram of values.
 #[derive(Debug, Serialize)]
-pub struct Histogram {
+pub(super) struct Histogram {
     /// The least and the largest value.
     range: Option<(f64, f64)>,
     /// How many values lie in each of equal parts of the range.
@@ -118,12 +140,40 @@ impl ViewerSession {
 
     /// The page that shows a scene of these [`Self::facts`].
     pub fn page(facts: &str, nonce: &str) -> Result<String> {
-        page::live(nonce, facts).map_err(|e| Error::io(Path::new("page"), "writing", e))
+        let mut page = Vec::new();
+        let written = page::write_asking(&mut page, nonce, "wavesplat", facts, page::Engine::Server);
+        let text = written.and_then(|()| String::from_utf8(page).map_err(std::io::Error::other));
+        text.map_err(|e| Error::io(Path::new("page"), "writing", e))
     }
 
     /// The facts about the scene for the page, as JSON.
     pub fn facts(&self) -> Result<String> {
-        serde_json::to_string(&self.known()?).map_err(|e| Error::setting("facts", e.to_string()))
+        self.facts_with(None)
+    }
+
+    /// The same for a page that opens the file by itself.
+    pub(super) fn facts_with(&self, mut file: Option<FileOfPage>) -> Result<String> {
+        let known = self.known()?;
+        if let Some(file) = &mut file {
+            file.first = self.first_head(&known)?;
+        }
+        serde_json::to_string(&Facts { file, ..known }).map_err(|e| Error::setting("facts", e.to_string()))
+    }
+
+    /// The head of the answer to a small picture of what the page shows first. None for modes that need more settings.
+    fn first_head(&self, Facts { mode, opening, center: [x, y, z], radius, .. }: &Facts) -> Result<Option<Value>> {
+        if [ModeName::Iso, ModeName::Slice].iter().any(|needing| needing.name() == *mode) {
+            return Ok(None);
+        }
+        const SIDE: f64 = 64.0;
+        let look = json!({ "look": {
+            "mode": mode, "frames": opening.to_string(), "size": format!("{SIDE}x{SIDE}"), "scale": SIDE / (2.0 * radius),
+            "view": ["30,30"], "center": format!("{x},{y},{z}"),
+        }});
+        let answer = self.pictures(&ViewRequest::read(look.to_string().as_bytes())?, &CancelToken::default())?;
+        let (length, rest) = answer.split_at(size_of::<u32>());
+        let length = length.try_into().map_or(0, u32::from_le_bytes) as usize;
+        serde_json::from_slice(&rest[..length]).map(Some).map_err(|e| Error::setting("facts", e.to_string()))
     }
 
     fn known(&self) -> Result<Facts> {
@@ -154,13 +204,16 @@ impl ViewerSession {
             coarsest: file.as_ref().map_or(0, |file| file.coarsest_detail()),
             numbers: (self.session.memory / BYTES_PER_NUMBER / 4).min(MOST_NUMBERS),
             maps: page::maps()?,
+            file: None,
         })
     }
 
     /// The mode that the viewer was started with, or else the one that shows its first frame best.
     fn first_mode(&self, opening: Opening) -> ModeName {
         let is_given = self.base.mode.is_some() || self.base.iso.is_some() || !self.base.slice.is_empty();
-        if is_given { mode_name(&self.base) } else { opening.mode }
+        let mode = if is_given { mode_name(&self.base) } else { opening.mode };
+        let is_possible = modes::check(&PictureRequest { mode: Some(mode), ..self.base.clone() }, false).is_ok();
+        if is_possible { mode } else { mode_name(&self.base) }
     }
 
     /// The pictures of a request: their description, then blocks of their numbers, as `engine/render/page/web/live.js`
@@ -168,7 +221,7 @@ impl ViewerSession {
     ///
     /// # Errors
     /// Those of rendering, more numbers than fit in memory, or [`Error::Cancelled`].
-    pub fn pictures(&self, view: &ViewRequest, work: &CancelToken) -> Result<Vec<u8>> {
+    pub(super) fn pictures(&self, view: &ViewRequest, work: &CancelToken) -> Result<Vec<u8>> {
         let request = view.applied_to(&self.base)?;
         let session = if view.ahead { self.session.ahead() } else { self.session.clone() };
         let mut plan = Plan::new(&session, &self.with_frames_for_colours(&request), &Caller(work))?;
@@ -193,7 +246,7 @@ impl ViewerSession {
     ///
     /// # Errors
     /// Inputs that are no coefficient file, or reads that fail.
-    pub fn series(&self, shares: [f64; 3], work: &CancelToken) -> Result<Vec<u8>> {
+    pub(super) fn series(&self, shares: [f64; 3], work: &CancelToken) -> Result<Vec<u8>> {
         let probe = vec![PointSpec(shares.map(AxisPosition::Share))];
         series_csv(&self.session, &PictureRequest { probe, ..self.base.clone() }, &Caller(work))
     }
@@ -202,7 +255,7 @@ impl ViewerSession {
     ///
     /// # Errors
     /// A frame that the archive lacks, or those of rendering.
-    pub fn histogram(&self, frame: Option<usize>, work: &CancelToken) -> Result<Histogram> {
+    pub(super) fn histogram(&self, frame: Option<usize>, work: &CancelToken) -> Result<Histogram> {
         let frames = frame.map_or(self.base.frames.clone(), |frame| Some((frame..frame + 1).into()));
         let (request, caller) = (PictureRequest { frames, ..self.base.clone() }, Caller(work));
         let Opened { mut scene, file, distributions, colours, axes, .. } =
@@ -220,7 +273,7 @@ impl ViewerSession {
     }
 
     /// The file of the pictures of a request, made in memory; ffmpeg alone needs a file for a movie.
-    pub fn save(&self, view: &ViewRequest, saved: Saved, work: &CancelToken) -> Result<Vec<u8>> {
+    pub(super) fn save(&self, view: &ViewRequest, saved: Saved, work: &CancelToken) -> Result<Vec<u8>> {
         if saved != Saved::Movie {
             let (out, bytes) = Output::to_memory(saved.name(), self.session.memory);
             self.write(view, saved, out, work)?;
@@ -247,7 +300,7 @@ impl ViewerSession {
     ///
     /// # Errors
     /// Those of [`ViewRequest::applied_to`].
-    pub fn command(&self, view: &ViewRequest, saved: Saved) -> Result<String> {
+    pub(super) fn command(&self, view: &ViewRequest, saved: Saved) -> Result<String> {
         let request = PictureRequest { certify: false, ..view.applied_to(&self.base)? };
         let inputs = self.session.paths().iter().map(|path| path.to_string_lossy().into_owned());
         let words =
@@ -288,31 +341,6 @@ impl Answer<'_> {
             all.extend(block);
             all
         }))
-    }
-}
-
-/// A kind of file that the page saves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Saved {
-    /// One picture.
-    Picture,
-    /// A page of all frames.
-    Page,
-    /// A movie of all frames.
-    Movie,
-}
-
-impl Saved {
-    const NAMES: [(&'static str, Self); 3] =
-        [("picture.png", Self::Picture), ("page.html", Self::Page), ("movie.mp4", Self::Movie)];
-
-    /// The kind of a file of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, saved)| saved)
-    }
-
-    fn name(self) -> &'static str {
-        Self::NAMES.into_iter().find(|(_, saved)| *saved == self).map_or("picture.png", |(name, _)| name)
     }
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
 use crate::errors::raised;
-use crate::look::{Viewer, bytes, render_from};
+use crate::look::{Viewer, bytes, page, render_from};
 use crate::{described, fork, job};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -67,6 +67,12 @@ impl File {
     ) -> PyResult<()> {
         let session = self.session.with_memory(bytes(memory).map_err(raised)?);
         render_from(py, &session, request, output, report)
+    }
+
+    /// Writes a page that holds the file, and whose pictures have the settings of a request.
+    fn page(&self, py: Python<'_>, request: &str, output: PathBuf, memory: &str) -> PyResult<()> {
+        let session = self.session.with_memory(bytes(memory).map_err(raised)?);
+        page(py, &session, request, output)
     }
 
     /// Starts a viewer, whose pictures have the settings of a request.

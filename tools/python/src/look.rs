@@ -9,7 +9,7 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::Mutex;
 use wavesplat::Error;
-use wavesplat::picture::{self, Caller, Inputs, PictureRequest, Session, ViewerSession};
+use wavesplat::picture::{self, Caller, Inputs, PictureRequest, Session, ViewerSession, write_page};
 use wavesplat_cli::Size;
 use wavesplat_cli::view::{self, Serving};
 
@@ -43,6 +43,12 @@ pub(crate) fn render_from(
 /// Bytes of a size such as 512MiB.
 pub(crate) fn bytes(memory: &str) -> wavesplat::Result<usize> {
     memory.parse().map(|size: Size| size.0).map_err(|what| Error::setting("memory", what))
+}
+
+/// Writes a page that holds a file and needs no server.
+pub(crate) fn page(py: Python<'_>, session: &Session, request: &str, output: PathBuf) -> PyResult<()> {
+    let viewer = ViewerSession::new(session, PictureRequest::from_json(request).map_err(raised)?, Vec::new());
+    job::run(py, None, |_, _| write_page(&viewer, &output, true))
 }
 
 /// A server that answers.

@@ -74,6 +74,10 @@ def test_figures(tmp_path, file):
     page = file.figure(size=(100, 80), frames=slice(0, 3))
     assert "<iframe srcdoc=" in page._repr_html_()
     assert "sandbox" in page._repr_html_()
+    whole = file.figure(interactive=True, mode="mip")
+    assert whole.format == "html" and b'id="program"' in whole.data and "iframe" in whole._repr_html_()
+    with pytest.raises(ValueError, match="interactive"):
+        file.figure("png", interactive=True)
     assert b"acTL" in file.figure("apng", frames=slice(0, 2), size=(80, 60)).data
     for several in ({"frames": [1, 2]}, {"frames": 1, "view": [(30, 30), "top"]}):
         assert file.figure("png", size=(80, 60), iso=[0.5, 1.5], **several).data.startswith(b"\x89PNG")

@@ -2,11 +2,11 @@
 
 use super::unfinished::{AllUnfinished, all};
 use crate::base::error::{Error, Result};
+use crate::base::system::{Instant, MetadataExt};
 use std::fs::{self, File, TryLockError};
 use std::io;
-use std::os::unix::fs::MetadataExt;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How long to wait for a lock: a killed process may hold it a little longer.
 const WAIT: Duration = Duration::from_secs(1);

@@ -3,9 +3,10 @@
 use super::plane_values::BlockPlanes;
 use crate::render::report::RenderReport;
 use rayon::prelude::*;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::system::Instant;
 
 /// A source of blocks.
 pub(in crate::render) trait BlockSource: Sync {

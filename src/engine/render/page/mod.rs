@@ -2,8 +2,9 @@
 //!
 //! `web/` holds what the browser runs: plain HTML, CSS and JavaScript, compiled into the program. `block.js` reads blocks,
 //! `colours.js` turns numbers into pixels, `player.js` shows them with the colour bar (`bar.js`) and the time line (`timeline.js`), `address.js`
-//! keeps the state in the address, and `stored.js` finds pictures in the page itself. In the viewer, `live.js` asks its server for them, and
-//! `steer.js` turns what the user does into requests.
+//! keeps the state in the address, and `stored.js` finds pictures in the page itself. In the viewer, `live.js` asks for them, and
+//! `steer.js` turns what the user does into requests. Who answers is an engine: a server (`server.js`), or the program itself
+//! in workers of the page (`workers.js`, and `worker.js` within them).
 
 mod about;
 mod block;
@@ -14,7 +15,7 @@ pub use block::Planes;
 pub use opening::{opening, spread};
 pub use {about::maps, block::headed};
 
-use base64::Engine;
+use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use std::io::{self, Write};
 use xxhash_rust::xxh3::xxh3_128;
@@ -30,8 +31,12 @@ const SCRIPT: &str = concat!(
     include_str!("web/player.js"),
     include_str!("web/stored.js"),
 );
-/// The scripts for pages that ask a server for pictures.
+/// The scripts for pages that ask for pictures.
 const LIVE: &str = concat!(include_str!("web/camera.js"), include_str!("web/live.js"), include_str!("web/steer.js"),);
+/// What answers them: a server, or the program in workers.
+const SERVER: &str = include_str!("web/server.js");
+const WORKERS: &str = include_str!("web/workers.js");
+const WORKER: &str = include_str!("web/worker.js");
 const CONTROLS: &str = include_str!("web/controls.html");
 const SAVING: &str = include_str!("web/saving.html");
 /// Begins to show pictures.
@@ -50,28 +55,77 @@ pub(crate) fn begin(out: &mut dyn Write, generator: &str, nonce: &str, about: &A
         "title" => Some(escaped(title)),
         "style" => Some(STYLE.into()),
         "nonce" => Some(nonce.into()),
-        "sources" | "controls" | "saving" => Some(String::new()),
+        "sources" => Some("script-src".into()),
+        "controls" | "saving" => Some(String::new()),
         _ => None,
     })
 }
 
-/// A page that asks its server for pictures. `facts` is a JSON object.
-pub fn live(nonce: &str, facts: &str) -> io::Result<String> {
-    let mut out = Vec::new();
-    fill(&mut out, PAGE, &|name| match name {
+/// What answers a page that asks for pictures.
+#[derive(Debug, Clone, Copy)]
+pub enum Engine<'a> {
+    /// The server that the page comes from.
+    Server,
+    /// Workers of the page, which has all that they need.
+    Within {
+        /// The program for browsers, packed by zlib.
+        program: &'a [u8],
+        /// A coefficient file.
+        file: &'a [u8],
+    },
+    /// Workers of the page. The program is beside it.
+    Beside {
+        /// Where files are, besides the page's own host.
+        hosts: &'a [String],
+    },
+}
+
+impl Engine<'_> {
+    /// What the page may load and run besides its own scripts, for its content security policy.
+    fn sources(self) -> String {
+        let workers = "worker-src blob:; script-src 'wasm-unsafe-eval'";
+        match self {
+            Self::Server => "connect-src 'self'; script-src".into(),
+            Self::Within { .. } => workers.into(),
+            Self::Beside { hosts } => format!("connect-src 'self' {}; {workers}", hosts.join(" ")),
+        }
+    }
+
+    fn scripts(self) -> String {
+        match self {
+            Self::Server => format!("{SCRIPT}{LIVE}{SERVER}{START}"),
+            Self::Within { .. } | Self::Beside { .. } => format!("{SCRIPT}{LIVE}{WORKERS}{START}"),
+        }
+    }
+
+    /// The parts that workers take from the page.
+    fn parts(self) -> String {
+        let part = |id: &str, text: &str| format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n");
+        match self {
+            Self::Server => String::new(),
+            Self::Beside { .. } => part("worker", WORKER),
+            Self::Within { program, file } => {
+                part("worker", WORKER) + &part("program", &BASE64.encode(program)) + &part("file", &BASE64.encode(file))
+            }
+        }
+    }
+}
+
+/// Writes a page that asks an engine for pictures. `facts` is a JSON object.
+pub fn write_asking(out: &mut dyn Write, nonce: &str, title: &str, facts: &str, engine: Engine<'_>) -> io::Result<()> {
+    fill(out, PAGE, &|name| match name {
         "generator" => Some(concat!("wavesplat ", env!("CARGO_PKG_VERSION")).into()),
-        "title" => Some("wavesplat".into()),
+        "title" => Some(escaped(title)),
         "style" => Some(STYLE.into()),
         "nonce" => Some(nonce.into()),
-        "sources" => Some("connect-src 'self'; ".into()),
+        "sources" => Some(engine.sources()),
         "controls" => Some(CONTROLS.into()),
         "saving" => Some(SAVING.trim_end().into()),
-        "blocks" => Some(String::new()),
+        "blocks" => Some(engine.parts()),
         "about" => Some(in_script(facts)),
-        "script" => Some(format!("{SCRIPT}{LIVE}{START}")),
+        "script" => Some(engine.scripts()),
         _ => None,
-    })?;
-    String::from_utf8(out).map_err(io::Error::other)
+    })
 }
 
 /// A JSON text for a script element, where "<" could begin its end tag.
@@ -107,9 +161,9 @@ fn parts() -> (&'static str, &'static str) {
     PAGE.split_once(BLOCKS).unwrap_or((PAGE, ""))
 }
 
-/// A word that only scripts and styles of this page know, the same in every run.
-pub(crate) fn nonce(about: &About) -> String {
-    format!("{:032x}", xxh3_128(format!("{about:?}").as_bytes()))
+/// A word that only scripts and styles of a page with this content know, the same in every run.
+pub fn nonce(content: &[u8]) -> String {
+    format!("{:032x}", xxh3_128(content))
 }
 
 /// A text with no letters that markup begins with.

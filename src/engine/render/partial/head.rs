@@ -198,7 +198,7 @@ impl PictureSetup {
         ensure(self.block.iter().all(|edge| *edge > 0), "has no blocks")?;
         ensure((1..=MOST_VIEWS).contains(&self.views.len()), "has no sound number of views")?;
         let size = self.views[0].size;
-        let pixels = size[0].checked_mul(size[1]).filter(|pixels| (1..=1 << 40).contains(pixels));
+        let pixels = size[0].checked_mul(size[1]).filter(|pixels| (1..=1 << 40).contains(&(*pixels as u64)));
         ensure(pixels.is_some() && self.views.iter().all(|view| view.size == size), "has no sound size of pictures")?;
         ensure(matches!(self.channels, 1 | 3), "has neither values nor colours")?;
         ensure(self.lod < 32 && self.exaggeration.is_finite() && self.exaggeration > 0.0, "has no sound lattice")?;

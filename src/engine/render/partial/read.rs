@@ -3,11 +3,11 @@
 use super::head::{Head, PictureRecord, RecordSpan, SCHEMA};
 use super::{END, MAGIC};
 use std::io::{self, Read};
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::address::refuse_address;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::files;
+use wavesplat_core::base::system::FileExt;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// The most bytes of a head, unpacked.

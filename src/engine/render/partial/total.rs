@@ -14,10 +14,10 @@ use crate::render::splat::ViewSetup;
 use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::grid::Region;
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::system::Instant;
 use wavesplat_core::base::time_labels::TimeLabels;
 
 /// The parts of one picture, and the numbers of their records.

@@ -8,9 +8,9 @@ use crate::render::report::{RenderReport, lap};
 use crate::render::splat::tile_rect::TileRect;
 use crate::render::splat::{BandAccumulator, Pixels, ResolvedTile, splat};
 use std::ops::DerefMut;
-use std::time::Instant;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::system::Instant;
 
 /// Views that are splatted together.
 pub(super) struct ViewGroup<'a> {

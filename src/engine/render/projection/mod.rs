@@ -28,10 +28,10 @@ use plan::{Budget, Kept};
 use reconstruct::PixelReconstructor;
 use splat_weights::splat_weights;
 use std::borrow::Cow;
-use std::time::Instant;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{BlockGrid, Grid};
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::system::Instant;
 use wavesplat_core::base::zeroed::Zeroed;
 use wavesplat_core::view::camera::View;
 

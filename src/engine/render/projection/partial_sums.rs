@@ -19,9 +19,9 @@ use crate::render::config::{RenderConfig, ViewTask};
 use crate::render::renderer::{Renderer, check_memory};
 use crate::render::report::{RenderReport, lap};
 use crate::render::splat::{Pixels, ResolvedTile, ViewSetup};
-use std::time::Instant;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::progress::Progress;
+use wavesplat_core::base::system::Instant;
 use wavesplat_core::base::zeroed::Zeroed;
 
 /// Sums of all pixels of a view, row by row.

@@ -17,7 +17,7 @@ impl Page {
     /// Begins the page.
     pub(super) fn new(mut out: Output, config: &SinkConfig) -> Result<Self> {
         let encoder = PageEncoder::new(config.clone())?;
-        let nonce = page::nonce(encoder.about());
+        let nonce = page::nonce(format!("{:?}", encoder.about()).as_bytes());
         let begun = page::begin(&mut out, &config.provenance.software, &nonce, encoder.about());
         begun.map_err(|e| Error::io(out.path(), "writing", e))?;
         Ok(Self { out, encoder, nonce })

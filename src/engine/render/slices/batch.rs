@@ -11,9 +11,9 @@ use super::{GROUP, finish};
 use crate::render::batches::{BlockSamples, SampleReader, Units};
 use crate::render::report::{RenderReport, lap};
 use rayon::prelude::*;
-use std::time::Instant;
 use wavesplat_core::base::error::Result;
 use wavesplat_core::base::grid::{BlockGrid, Region};
+use wavesplat_core::base::system::Instant;
 
 /// A batch of frames, seen from one view.
 pub(in crate::render) struct SlicePass<'a, B: Blend> {

@@ -181,7 +181,7 @@ fn progress<'a>(stage: &'static str, small: &RenderConfig, reporter: &'a dyn Rep
 
 /// The pixels of small pictures of a few frames.
 fn pixels_of_frames(scene: &mut dyn Scene, small: &RenderConfig, reporter: &dyn Reporter) -> Result<Pixels> {
-    let frames = spread(scene, frames_of(scene.grid().dims.iter().product(), small));
+    let frames = spread(scene, frames_of(scene.grid().whole().voxels(), small));
     let mut pixels = Pixels::default();
     pictures(
         scene,

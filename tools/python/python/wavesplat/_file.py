@@ -358,17 +358,31 @@ class File:
         """
         return pictures(options, lambda output: self._render(output, options, progress))
 
-    def figure(self, format: str = "html", *, height: int = 700, progress: Progress = False, **options: Any) -> Figure:
+    def figure(
+        self,
+        format: str = "html",
+        *,
+        interactive: bool = False,
+        height: int = 700,
+        progress: Progress = False,
+        **options: Any,
+    ) -> Figure:
         """A picture that a notebook shows.
 
         Args:
             format: "html" for an interactive page with all frames, "png" for one picture or a sheet of several, "apng" or
                 "gif" for a movie.
+            interactive: Whether a page holds the whole file and the program instead of finished pictures: it turns, cuts
+                and plays the volume as `view` does, without a server. `options` are then those of `view`.
             height: Pixels of height that a page takes in a notebook.
             progress: Whether to show progress, or a function of (done, all).
             options: As for `render`. ``annotate`` is True by default.
 
         """
+        if interactive and format == "html":
+            return self._page(height, options)
+        if interactive:
+            raise ValueError(f"interactive: takes the format 'html', not {format!r}")
         if format not in ("html", "png", "apng", "gif"):
             raise ValueError(f"format: 'html', 'png', 'apng' or 'gif', not {format!r}")
         options = {"annotate": True, **options}
@@ -383,6 +397,13 @@ class File:
             path = Path(folder, f"figure.{format}")
             self._render(str(path), options, progress)
             return Figure(path.read_bytes(), format, height)
+
+    def _page(self, height: int, options: dict[str, Any]) -> Figure:
+        memory = str(options.pop("memory", MEMORY))
+        with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
+            path = Path(folder, "page.html")
+            self._file.page(request(options), str(path), memory)
+            return Figure(path.read_bytes(), "html", height)
 
     def _render(self, output: str, options: dict[str, Any], progress: Progress) -> None:
         options = {"lod": self.lod or None, **options}

@@ -1,12 +1,10 @@
-// The source of a page that asks its server for pictures.
+// The source of a page that asks for pictures: a server, or the program in its workers.
 
 const BLOCK_FRAMES = 32, COARSE_FRAMES = 8; // frames of a request
-const BLOCK_TIME = 1500; // milliseconds that a block of full pictures may take
 const STEPS = 3; // frames whose coarse pictures are loaded ahead of a step in time
 const REST = 250; // milliseconds without a change after which pictures are complete
 const IDLE = 40; // milliseconds after a full picture until others are loaded ahead
 const PATIENCE = 600; // milliseconds after which a request says how far it is
-const SLOW = 30e6; // bytes per second below which answers are packed
 
 // Ranks of requests. A request never cancels one of higher rank.
 const AHEAD = 0, PLOT = 1, USER = 2;
@@ -30,7 +28,8 @@ const short = number => Number(number.toPrecision(9)), texts = numbers => number
 const pause = milliseconds => new Promise(next => setTimeout(next, milliseconds));
 
 class Live {
-  constructor(facts) {
+  constructor(facts, engine) {
+    this.engine = engine;
     for (const name in facts.maps) facts.maps[name] = bytesOf(facts.maps[name]);
     this.facts = facts;
     this.first = {
@@ -52,7 +51,9 @@ class Live {
     this.underWay = null; // the request that is asked
     this.wanted = 0; // how many requests of the user there were
     this.waiting = 0; // and how many of them wait
-    this.isMoving = this.isSlow = false;
+    this.isMoving = false;
+    const { about, opacity } = facts.file?.first ?? {};
+    if (about) this.learnColours(`${this.firstMode} `, { ...about, opacity }, FULL);
   }
 
   // What the address keeps.
@@ -60,7 +61,7 @@ class Live {
     const { mode, view, center, zoom, slices, opacity, shade, annotate, theme } = this.look, home = this.home();
     const unless = (value, first) => String(value) === String(first) ? null : String(value);
     return {
-      mode: unless(mode, this.firstMode), view: unless(view, home.view), center: unless(texts(center), texts(home.center)), zoom: unless(short(zoom), 1),
+      archive: this.archive, mode: unless(mode, this.firstMode), view: unless(view, home.view), center: unless(texts(center), texts(home.center)), zoom: unless(short(zoom), 1),
       iso: mode === 'iso' ? this.isoShare : null, slices: mode === 'slice' ? slices.map(([axis, share]) => `${axis}:${short(share)}`).join() : null,
       opacity: opacity?.map(point => point.join(':')).join(), shade: shade ? 1 : null, box: annotate ? null : 0, white: theme ? 1 : null,
     };
@@ -103,7 +104,7 @@ class Live {
       iso: iso.length ? iso.join() : undefined, slice: slices.length ? slices.map(([axis, share]) => `${axis}=${short(100 * share)}%`) : undefined,
       annotate, theme, ...this.coloursOf(mode, colours),
     };
-    return { look, certify: isOfErrors && quality !== COARSE, packed: this.isSlow };
+    return { look, certify: isOfErrors && quality !== COARSE, packed: this.engine.isSlow };
   }
 
   // The fields of a PictureRequest for colours.
@@ -216,16 +217,16 @@ class Live {
 
   // The frames to ask for together, around one.
   block(index, quality) {
-    const { mode } = this.look, [width, height] = this.measures(quality).size;
+    const { look: { mode }, engine: { blockTime } } = this, [width, height] = this.measures(quality).size;
     if (mode === 'error') return [index, index + 1]; // errors take long
     const each = mode === 'composite' || mode === 'iso' || this.kind === 'channels' ? 4 : 1;
-    const fit = Math.floor(this.facts.numbers / (width * height * each)), inTime = Math.floor(BLOCK_TIME / (this.pace[mode] ?? BLOCK_TIME));
+    const fit = Math.floor(this.facts.numbers / (width * height * each)), inTime = Math.floor(blockTime / (this.pace[mode] ?? blockTime));
     const count = clamped(Math.min(fit, quality === COARSE ? COARSE_FRAMES : inTime), 1, BLOCK_FRAMES), first = index - index % count;
     return [first, Math.min(first + count, this.sequences[0].pictures.length)];
   }
 
   // Loads pictures in turn. Stops a running request that does not help, and never sends one that is no longer wanted.
-  async load(key, { frames, quality, index, rank }) {
+  async load(key, { frames, quality, index, rank, isSpare = false }) {
     const { underWay, turn: before } = this, isOfUser = rank === USER;
     const isHelp = underWay?.key === key && underWay.frames[0] <= index && index < underWay.frames[1];
     const isStopped = underWay && (underWay.quality !== COARSE || underWay.rank === AHEAD) && !isHelp;
@@ -240,7 +241,7 @@ class Live {
       const kept = this.kept.get(key)?.get(index);
       if (kept) return kept;
       if (key !== this.key(quality) || (isOfUser ? wanted !== this.wanted : this.waiting > 0)) throw new Stale();
-      this.underWay = { key, frames, quality, rank, stop: new AbortController(), waits: stops };
+      this.underWay = { key, frames, quality, rank, isSpare, stop: new AbortController(), waits: stops };
       return (await this.ask(key, frames, quality)).get(index);
     } finally {
       this.underWay = null;
@@ -250,10 +251,8 @@ class Live {
 
   async ask(key, frames, quality) {
     const { mode, range } = this.look, colours = this.colourKey(quality), isChosen = mode === 'composite' && range, begun = performance.now();
-    const { stop, rank } = this.underWay, ahead = rank !== USER;
-    const answer = await this.post('pictures', { ...this.request(frames, quality), ahead }, stop.signal, rank);
-    const started = performance.now(), bytes = new Uint8Array(await answer.arrayBuffer()), ended = performance.now();
-    if (bytes.length > 2 ** 20 && bytes.length / (ended - started) * 1000 < SLOW) this.isSlow = true;
+    const { stop, rank, isSpare } = this.underWay, request = { ...this.request(frames, quality), ahead: isSpare };
+    const bytes = await this.answer('pictures', request, { signal: stop.signal, isCoarse: quality === COARSE }, rank), ended = performance.now();
     if (!this.underWay?.waits) this.learnPace(mode, quality, (ended - begun) / (frames[1] - frames[0]), frames); // not for what was stopped
     const length = new DataView(bytes.buffer).getUint32(0, true);
     const { about, blocks, errors, opacity } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
@@ -345,17 +344,22 @@ class Live {
     this.filled();
   }
 
-  // Loads the pictures of some frames from the first one on that is not there.
+  // Loads the pictures of some frames from the first one on that is not there. Nobody waits for them.
   async loadMissing([first, end], quality) {
-    let missing = first;
-    while (missing < end && (this.found(quality, missing) || quality === COARSE && this.found(FULL, missing))) missing++;
-    if (missing < end) await this.load(this.key(quality), { frames: [missing, end], quality, index: missing, rank: AHEAD });
+    const isThere = frame => this.found(quality, frame) || quality === COARSE && this.found(FULL, frame);
+    const { wanted, engine: { together = end - first } } = this;
+    for (let frame = first; frame < end && wanted === this.wanted; frame++) {
+      if (isThere(frame)) continue;
+      const frames = [frame, Math.min(frame + together, end)];
+      await this.load(this.key(quality), { frames, quality, index: frame, rank: AHEAD, isSpare: true });
+      frame = frames[1] - 1;
+    }
   }
 
-  // Stops loading pictures ahead of the user.
+  // Stops what is asked for: something else is wanted.
   halt() {
     clearTimeout(this.filling);
-    if (this.underWay?.rank === AHEAD) this.underWay.stop.abort();
+    this.underWay?.stop.abort();
   }
 
   // Nothing moves any more.
@@ -376,18 +380,16 @@ class Live {
     this.changed();
   }
 
-  // Asks the server, again and again until it answers. Shows its progress while the user waits.
-  async post(where, request, signal, rank = USER) {
-    const what = where.startsWith('save') ? 'making the file' : request.certify ? 'bounding the errors' : 'drawing';
+  // The answer to a question, in bytes. Shows what the user waits for.
+  async answer(name, request, how = {}, rank = USER) {
+    const what = name === 'save' ? 'making the file' : request.certify ? 'bounding the errors' : 'drawing';
     let isDone = false;
     const working = setInterval(async () => {
-      const share = rank === USER && await fetch('progress').then(answer => answer.text()).catch(() => '');
-      if (share && !isDone) say('status', `${what}, ${Math.round(100 * share)} %`);
+      const share = rank === USER ? await this.engine.progress() : undefined;
+      if (share !== undefined && !isDone) say('status', share === null ? `${what} …` : `${what}, ${Math.round(100 * share)} %`);
     }, PATIENCE);
     try {
-      const answer = await this.patiently(where, { method: 'POST', body: JSON.stringify(request), signal });
-      if (!answer.ok) throw new Error(await answer.text() || answer.statusText);
-      return answer;
+      return await this.engine.ask(name, request, how);
     } finally {
       isDone = true;
       clearInterval(working);
@@ -395,22 +397,10 @@ class Live {
     }
   }
 
-  async patiently(where, options) {
-    for (;;) {
-      try {
-        return await fetch(where, options);
-      } catch (error) {
-        if (options.signal?.aborted || !(error instanceof TypeError)) throw error;
-        say('status', 'wavesplat view does not answer. If it has ended, start it again.');
-        await pause(1000);
-      }
-    }
-  }
-
   // Asks for a file of the current view, or for its command.
-  async made(where, file) {
+  async made(name, file) {
     const frames = file.endsWith('.png') ? [this.index, this.index + 1] : [0, this.sequences[0].pictures.length];
-    const certify = where === 'command' && this.look.mode === 'error';
-    return this.post(`${where}?${new URLSearchParams({ file })}`, { ...this.request(frames, FULL, this.colours()), certify });
+    const certify = name === 'command' && this.look.mode === 'error';
+    return this.answer(name, { ...this.request(frames, FULL, this.colours()), certify, file });
   }
 }

@@ -55,7 +55,7 @@ class Player {
     if (index >= 0) this.index = index;
     if (Object.hasOwn(maps, map ?? '')) this.chosen.map = map;
     const ends = numbersIn(range, 2), [bent] = numbersIn(gamma, 1) ?? [];
-    this.chosen[`of ${mode ?? this.source.look?.mode ?? first}`] = {
+    this.chosen[`of ${mode ?? this.source.firstMode ?? first}`] = {
       ...(ends && ends[0] < ends[1] ? { range: ends } : {}), ...(log ? { isLog: log === '1' } : {}), ...(bent ? { gamma: clamped(bent, -1, 1) } : {}),
     };
   }

@@ -1,5 +1,12 @@
 
 const about = JSON.parse(element('about').textContent);
-window.player = new Player(about.live ? new Live(about) : new Stored(about));
-if (about.live) window.steering = new Steering(window.player);
-else window.player.show();
+if (about.live) {
+  const archives = about.archives ?? [about], facts = archives.find(({ title }) => title === Address.read().archive) ?? archives[0];
+  window.player = new Player(new Live(facts, facts.file ? new Workers(facts.file) : new Server()));
+  window.player.source.archive = facts === archives[0] ? null : facts.title;
+  window.steering = new Steering(window.player);
+  window.steering.offerArchives(archives.map(({ title }) => title), facts.title);
+} else {
+  window.player = new Player(new Stored(about));
+  window.player.show();
+}

@@ -3,14 +3,10 @@
 const AXES = ['x', 'y', 'z'];
 const HELP = ['Drag turns, shift-drag moves, the wheel zooms, a double click resets. W A S D turn, + and - zoom, space plays, arrows step.', 'A finger turns, two zoom and move, a double tap resets.'];
 
-// How common samples are, of some frames or of one; nothing if the server does not say.
-async function howCommon(of = {}) {
-  const answer = await fetch(`histogram?${new URLSearchParams(of)}`).catch(() => null);
-  return answer?.ok ? answer.json().catch(() => null) : null;
-}
-
 // Pairs in a text like "a:1,b:2".
 const pairs = text => (text ?? '').split(',').map(pair => pair.split(':')).filter(pair => pair.length === 2);
+
+const textOf = bytes => new TextDecoder().decode(bytes);
 
 const ZOOM = [0.05, 500];
 
@@ -132,10 +128,10 @@ class Steering {
     const point = this.point(event), { origin, spacing, dims } = this.live.facts, place = this.place(event);
     if (!point) return false;
     const share = point.map((at, axis) => dims[axis] > 1 ? clamped((at - origin[axis]) / (spacing[axis] * (dims[axis] - 1)), 0, 1) : 0);
-    const answer = await fetch('series', { method: 'POST', body: JSON.stringify(share) });
-    if (!answer.ok) return false; // frames have no series of their own: the pixel's is plotted
+    const answer = await this.live.engine.ask('series', share).catch(error => { if (this.live.facts.file) throw error; });
+    if (!answer) return false; // frames have no series of their own: the pixel's is plotted
     if (!isWanted()) return true;
-    const lines = (await answer.text()).trim().split('\n').slice(1);
+    const lines = textOf(answer).trim().split('\n').slice(1);
     this.player.drawSeries(lines.map(line => Number(line.split(',').at(-1) || NaN)), `${this.live.facts.values || 'Values'} at ${place}`);
     return true;
   }
@@ -195,6 +191,7 @@ class Steering {
       on(`slice-${axis}`, 'change', () => this.choose(false));
       on(`place-${axis}`, 'input', () => { element(`slice-${axis}`).checked = true; this.choose(true); });
     }
+    element('save-movie').hidden = Boolean(this.live.facts.file); // ffmpeg makes movies
     on('iso', 'input', () => { this.isIsoChosen = true; this.choose(true); });
     on('map', 'input', () => { if (this.mode === 'composite') this.choose(false); });
     on('copy', 'click', () => this.copy());
@@ -203,6 +200,14 @@ class Steering {
     on('opacity-auto', 'click', () => this.live.change({ opacity: null }, false));
     this.player.bar.opaque = points => this.live.change({ opacity: points }, true);
     say('help', HELP[Number(window.matchMedia('(pointer: coarse)').matches)]);
+  }
+
+  // Offers the archives of the page, if there are several.
+  offerArchives(titles, chosen) {
+    element('archives').hidden = titles.length < 2;
+    element('archive').replaceChildren(...titles.map(title => new Option(title)));
+    element('archive').value = chosen;
+    element('archive').addEventListener('change', () => { location.hash = `archive=${encodeURIComponent(element('archive').value)}`; });
   }
 
   // Names the side that is seen, if it has a name.
@@ -246,10 +251,15 @@ class Steering {
     if (quality !== COARSE) this.showHowCommon();
   }
 
+  // How common samples are, of some frames or of one; nothing if that cannot be said.
+  howCommon(of = {}) {
+    return this.live.engine.ask('histogram', of).then(bytes => JSON.parse(textOf(bytes))).catch(() => null);
+  }
+
   // Shows how common the samples are behind their opacities.
   async showHowCommon() {
     const { bar } = this.player;
-    this.common ??= howCommon();
+    this.common ??= this.howCommon();
     const common = await this.common;
     if (!common?.range || this.mode !== 'composite') return;
     bar.showCounts(countsOver(bar.domain, common));
@@ -282,8 +292,8 @@ class Steering {
   async beginIso() {
     const { index } = this.player, slider = element('iso');
     this.live.halt();
-    const range = this.live.facts.range ?? (await howCommon())?.range ?? this.live.first.range;
-    const { surface } = await howCommon({ frame: index }) ?? {};
+    const range = this.live.facts.range ?? (await this.howCommon())?.range ?? this.live.first.range;
+    const { surface } = await this.howCommon({ frame: index }) ?? {};
     if (surface != null && !this.isIsoChosen) slider.value = (surface - range[0]) / (range[1] - range[0]);
     return range;
   }
@@ -296,13 +306,13 @@ class Steering {
 
   async copy() {
     try {
-      await offer('The command that draws this', await (await this.live.made('command', 'picture.png')).text());
+      await offer('The command that draws this', textOf(await this.live.made('command', 'picture.png')));
     } catch (error) { problem(error); }
   }
 
   async save(file) {
     try {
-      download(await (await this.live.made('save', file)).blob(), file);
+      download(new Blob([await this.live.made('save', file)]), file);
       say('readout', `Saved ${file}`);
     } catch (error) { problem(error); }
   }

@@ -3,7 +3,12 @@
 // Bytes of pictures that are kept unpacked.
 const KEPT_BYTES = 512 * 2 ** 20;
 
-const bytesOf = base64 => Uint8Array.from(atob(base64), letter => letter.charCodeAt(0));
+function bytesOf(base64) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64);
+  const text = atob(base64), bytes = new Uint8Array(text.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
+  return bytes;
+}
 
 class Stored {
   constructor(about) {

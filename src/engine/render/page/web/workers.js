@@ -1,0 +1,132 @@
+// Answers by the program itself, in two workers of the page: one for coarse pictures, which show at once, and one for all else.
+
+// Milliseconds that work which nobody wants may still take, until another worker takes the place: longer if what it read is lost.
+const GRACE = 200, GRACE_FAR = 3000;
+
+class Workers {
+  // The program and the file are packed, in elements of the page or beside it.
+  constructor(file) {
+    this.blockTime = 300; // milliseconds that a block of full pictures may take: nothing stops it
+    this.together = 1; // frames that are asked for together while nobody waits
+    const source = URL.createObjectURL(new Blob([element('worker').textContent], { type: 'text/javascript' }));
+    const hand = memory => new Hand(file.url ? GRACE_FAR : GRACE, async () => {
+      this.ready ??= this.read(file);
+      this.ready.catch(() => { this.ready = null; }); // the next question tries again
+      return { source, begins: { memory, ...await this.ready } };
+    });
+    [this.coarse, this.full] = file.memory.map(hand);
+  }
+
+  // The program, and the file or where it is.
+  async read({ name, length, request, url, program }) {
+    const within = element('file'), far = url && new URL(url, location.href).href;
+    const [packed] = await Promise.all([program ? fetched(program) : bytesOf(element('program').textContent), far && checkRanges(far, name)]);
+    const module = await WebAssembly.compile(await inflated(packed)), bytes = within && bytesOf(within.textContent);
+    within?.remove(); // its text takes memory
+    return { module, file: { name, length, request, url: far, bytes } };
+  }
+
+  ask(name, body, { signal, isCoarse } = {}) {
+    return (isCoarse ? this.coarse : this.full).ask(name, new TextEncoder().encode(JSON.stringify(body)), signal);
+  }
+
+  async progress() { return null; }
+}
+
+async function fetched(address) {
+  const answer = await fetch(address).catch(() => null);
+  if (answer?.ok) return new Uint8Array(await answer.arrayBuffer());
+  throw new Error(answer ? `${address}: the host answers ${answer.status}` : `${address} cannot be read: this folder opens from a server, not from the disk; or the server does not answer`);
+}
+
+// An error unless the host of a file answers ranges, found out before it sends the whole file.
+async function checkRanges(address, name) {
+  const answer = await fetch(address, { headers: { Range: 'bytes=0-0' } }).catch(() => null);
+  answer?.body?.cancel();
+  if (answer?.status === 200) throw new Error(`${name}: its host sends whole files only; this page needs ranges of bytes`);
+}
+
+// A worker that answers one question after another. Nothing interrupts it: if it works too long on what nobody wants, another
+// one takes its place.
+class Hand {
+  constructor(grace, begins) {
+    Object.assign(this, { grace, begins });
+    this.questions = []; // those that wait, and the one that is asked
+    this.asked = null;
+  }
+
+  ask(name, body, signal) {
+    return new Promise((resolve, reject) => {
+      const question = { name, body, resolve, reject };
+      signal?.addEventListener('abort', () => this.drop(question));
+      this.questions.push(question);
+      this.go();
+    });
+  }
+
+  drop(question) {
+    question.isDropped = true;
+    question.reject(new DOMException('nobody waits any more', 'AbortError'));
+    if (question !== this.asked) this.questions = this.questions.filter(other => other !== question);
+    this.go();
+  }
+
+  // Asks the first question that waits. If nobody wants the one that is asked, it waits no longer than a while.
+  go() {
+    const { asked } = this;
+    if (!asked) this.next();
+    else if (asked.isDropped && this.questions.length > 1) setTimeout(() => { if (this.asked === asked && this.questions.length > 1) this.restart(); }, this.grace);
+  }
+
+  async next() {
+    if (this.isStarting || !this.questions.length) return;
+    if (!this.worker) await this.start();
+    const { worker, questions: [question] } = this;
+    if (!worker || !question || this.asked) return;
+    this.asked = question;
+    const { answer, error, isBroken } = await answerOf(worker, { name: question.name, body: question.body });
+    if (worker !== this.worker) return;
+    if (error === undefined) question.resolve(answer);
+    else question.reject(new Error(error));
+    if (isBroken) return this.restart();
+    this.end();
+  }
+
+  end() {
+    this.questions = this.questions.filter(question => question !== this.asked);
+    this.asked = null;
+    this.next();
+  }
+
+  restart() {
+    this.worker?.terminate();
+    this.worker = null;
+    this.end();
+  }
+
+  // Starts a worker. If it does not start, all questions fail, and the next one tries again.
+  async start() {
+    this.isStarting = true;
+    let worker;
+    try {
+      const { source, begins } = await this.begins();
+      worker = new Worker(source);
+      const { error } = await answerOf(worker, { begins });
+      if (error !== undefined) throw new Error(error);
+      this.worker = worker;
+    } catch (error) {
+      worker?.terminate();
+      this.questions.splice(0).forEach(question => question.reject(error));
+    }
+    this.isStarting = false;
+  }
+}
+
+// What a worker answers to a message.
+function answerOf(worker, message) {
+  return new Promise(resolve => {
+    worker.onmessage = ({ data }) => resolve(data);
+    worker.onerror = worker.onmessageerror = event => resolve({ error: event.message ?? 'the worker of this page does not answer', isBroken: true });
+    worker.postMessage(message);
+  });
+}
