@@ -30,7 +30,8 @@ fn shells_accept_the_completions() {
 fn there_is_a_man_page_for_each_command() {
     let work = Work::new();
     work.wavesplat("generate man -o .").ok();
-    let commands = ["append", "convert", "extract", "generate", "info", "merge", "recover", "scan", "verify", "view"];
+    let commands =
+        ["append", "convert", "extract", "generate", "info", "merge", "page", "recover", "scan", "verify", "view"];
     let pages: Vec<String> = commands.iter().map(|command| format!("wavesplat-{command}.1")).collect();
     assert_eq!(work.names(), [pages.as_slice(), &["wavesplat.1".into()]].concat());
     let page = String::from_utf8(work.read("wavesplat-convert.1")).unwrap();

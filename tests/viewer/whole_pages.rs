@@ -159,8 +159,17 @@ fn a_site_reads_the_parts_that_it_shows() {
     work.wavesplat("page a.wspl b.wspl --beside -o site/").ok();
     work.wavesplat("page a.wspl --beside -o site").fails(2, &["site", "--force"]);
     work.wavesplat("page a.wspl b.wspl --beside -o site --force").ok();
-    std::fs::create_dir(work.path("other")).unwrap();
-    work.wavesplat("page a.wspl --beside -o other --force").fails(1, &["other", "no folder of a page"]);
+    for name in ["empty", "other"] {
+        std::fs::create_dir(work.path(name)).unwrap();
+    }
+    work.wavesplat("page a.wspl --beside -o empty").ok();
+    work.write("other/mine.wspl", work.read("a.wspl"));
+    work.wavesplat("page a.wspl --beside -o other --force").fails(2, &["other", "no folder of a page"]);
+    work.write("empty/mine.wspl", work.read("a.wspl"));
+    work.wavesplat("page a.wspl --beside -o empty --force").fails(2, &["mine.wspl", "not a part of the page"]);
+    work.wavesplat("page a.wspl a.wspl --beside -o twice").fails(2, &["two have the name a.wspl"]);
+    work.wavesplat("page s3://bucket/a.wspl --beside -o far").fails(2, &["s3://bucket/a.wspl", "https://"]);
+    work.wavesplat("page https://me:secret@host/a.wspl --beside -o far").fails(2, &["host/a.wspl", "user name"]);
     work.write("empty.html", "<script>player = {}</script>");
     assert!(work.read("site/a.wspl") == work.read("a.wspl") && work.read("site/b.wspl") == work.read("b.wspl"));
     let fate = Arc::new(Mutex::new(Fate::Answer));
@@ -182,7 +191,7 @@ fn a_site_reads_the_parts_that_it_shows() {
         (Fate::Whole, "sends whole files only"),
         (Fate::Refuse(403, String::new(), String::new()), "answers 403"),
         (Fate::Replaced(vec![0; 77], "two".into()), "has changed since this page was made"),
-        (Fate::Flipped(5), "damaged"),
+        (Fate::Flipped(5), "a.wspl"),
     ] {
         *fate.lock().unwrap() = told;
         browser.open(&format!("http://127.0.0.1:{}/", server.port()));

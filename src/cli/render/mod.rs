@@ -10,7 +10,7 @@ use args::Cli;
 use clap::Parser;
 pub use generate::Program;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_jobs::picture::{self, PictureRequest, Session, ViewerSession, is_coefficient_name};
 
@@ -46,6 +46,23 @@ pub fn viewer_session(
     options: impl IntoIterator<Item = OsString>,
 ) -> Result<ViewerSession> {
     let method = if inputs.iter().all(|path| is_coefficient_name(path)) { "coefficients" } else { "direct" };
+    session_of(inputs, method, memory, options)
+}
+
+/// The same of a coefficient file of any name.
+///
+/// # Errors
+/// As [`viewer_session`].
+pub fn file_session(input: &Path, memory: usize, options: impl IntoIterator<Item = OsString>) -> Result<ViewerSession> {
+    session_of(&[input.into()], "coefficients", memory, options)
+}
+
+fn session_of(
+    inputs: &[PathBuf],
+    method: &str,
+    memory: usize,
+    options: impl IntoIterator<Item = OsString>,
+) -> Result<ViewerSession> {
     let mut words = vec![format!("--method={method}").into(), format!("--memory={memory}").into()];
     words.extend(options);
     words.extend(["-o".into(), "live.html".into(), "--".into()]);

@@ -8,7 +8,7 @@ use super::plan::opening::{Opening, opening_of};
 use super::plan::ranges::distribution;
 use super::plan::ranges::distribution_of_frames;
 use super::reporter::Caller;
-use super::request::{PictureRequest, option};
+use super::request::{PictureRequest, option, wrong};
 use super::series::series_csv;
 use super::session::Session;
 use super::values::{ModeName, PointSpec, ViewAngles};
@@ -160,20 +160,22 @@ impl ViewerSession {
         serde_json::to_string(&Facts { file, ..known }).map_err(|e| Error::setting("facts", e.to_string()))
     }
 
-    /// The head of the answer to a small picture of what the page shows first. None for modes that need more settings.
+    /// The head of the answer to a small picture of what the page shows first. None if the page chooses a surface or a slice.
     fn first_head(&self, Facts { mode, opening, center: [x, y, z], radius, .. }: &Facts) -> Result<Option<Value>> {
-        if [ModeName::Iso, ModeName::Slice].iter().any(|needing| needing.name() == *mode) {
+        const SIDE: f64 = 64.0;
+        let is_left = |needing: ModeName, is_given: bool| *mode == needing.name() && !is_given;
+        if is_left(ModeName::Iso, self.base.iso.is_some()) || is_left(ModeName::Slice, !self.base.slice.is_empty()) {
             return Ok(None);
         }
-        const SIDE: f64 = 64.0;
+        let given = serde_json::to_value(&self.base).map_err(wrong)?;
         let look = json!({ "look": {
             "mode": mode, "frames": opening.to_string(), "size": format!("{SIDE}x{SIDE}"), "scale": SIDE / (2.0 * radius),
-            "view": ["30,30"], "center": format!("{x},{y},{z}"),
+            "view": ["30,30"], "center": format!("{x},{y},{z}"), "iso": given["iso"], "slice": given["slice"],
         }});
         let answer = self.pictures(&ViewRequest::read(look.to_string().as_bytes())?, &CancelToken::default())?;
         let (length, rest) = answer.split_at(size_of::<u32>());
         let length = length.try_into().map_or(0, u32::from_le_bytes) as usize;
-        serde_json::from_slice(&rest[..length]).map(Some).map_err(|e| Error::setting("facts", e.to_string()))
+        serde_json::from_slice(&rest[..length]).map(Some).map_err(wrong)
     }
 
     fn known(&self) -> Result<Facts> {
@@ -211,9 +213,12 @@ impl ViewerSession {
     /// The mode that the viewer was started with, or else the one that shows its first frame best.
     fn first_mode(&self, opening: Opening) -> ModeName {
         let is_given = self.base.mode.is_some() || self.base.iso.is_some() || !self.base.slice.is_empty();
-        let mode = if is_given { mode_name(&self.base) } else { opening.mode };
-        let is_possible = modes::check(&PictureRequest { mode: Some(mode), ..self.base.clone() }, false).is_ok();
-        if is_possible { mode } else { mode_name(&self.base) }
+        if is_given {
+            return mode_name(&self.base);
+        }
+        let takes =
+            |mode: &ModeName| modes::check(&PictureRequest { mode: Some(*mode), ..self.base.clone() }, false).is_ok();
+        [opening.mode, ModeName::Composite].into_iter().find(takes).unwrap_or(ModeName::Projection)
     }
 
     /// The pictures of a request: their description, then blocks of their numbers, as `engine/render/page/web/live.js`

@@ -7,7 +7,7 @@ use super::viewer::{FileOfPage, ViewerSession};
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use wavesplat_core::base::address::{is_address, public_name};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::files;
@@ -58,38 +58,48 @@ pub fn write_page(viewer: &ViewerSession, output: &Path, replace: bool) -> Resul
 /// # Errors
 /// As [`write_page`], files of the same name, and a folder that is there and not one of these.
 pub fn write_site(viewers: &[ViewerSession], path: &Path, replace: bool) -> Result<()> {
-    let path: PathBuf = path.components().collect(); // without a slash at the end
+    // Without a slash at the end, and the folder itself instead of a link.
+    let path = path.canonicalize().unwrap_or_else(|_| path.components().collect());
     refuse_other(&path, replace)?;
+    let paths = viewers.iter().flat_map(|viewer| viewer.session.paths());
+    let hosts = paths.filter_map(|path| host(path)).collect::<Result<Vec<_>>>()?;
     let all = viewers.iter().map(Shown::new).collect::<Result<Vec<_>>>()?;
     if let Some(twin) = (1..all.len()).find(|n| all[..*n].iter().any(|other| other.name == all[*n].name)) {
-        return Err(Error::input(all[twin].file.path(), "has the name of another input: rename it"));
+        return Err(Error::setting("inputs", format!("two have the name {}", all[twin].name)));
     }
     let folder = OutputFolder::create(&path, PROGRAM_NAME, Takes::Whole, replace)?;
     folder.write(PROGRAM_NAME, PROGRAM)?;
-    let hosts = all.iter().filter_map(Shown::host).collect::<Result<Vec<_>>>()?;
     let facts = all.iter().map(|shown| shown.facts(Some(shown.put(&folder)?))).collect::<Result<Vec<_>>>()?;
     let title = all.iter().map(|shown| shown.name.as_str()).collect::<Vec<_>>().join(", ");
     let facts = format!(r#"{{"live":true,"archives":[{}]}}"#, facts.join(","));
     let mut out = Output::create(&folder.place("index.html"), false)?;
     write(&mut out, &title, &facts, Engine::Beside { hosts: &hosts })?;
     out.commit()?;
+    let _ = std::fs::remove_dir(&path); // unless something is in it
     folder.commit()
 }
 
-/// An error unless the folder is new, or holds nothing but what this writes.
+/// An error unless a folder can have this name: there is none, an empty one, or, to replace, one that this wrote and that has
+/// nothing else in it.
 fn refuse_other(path: &Path, replace: bool) -> Result<()> {
-    if !path.exists() {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    if let Some(missing) = parent.filter(|parent| !parent.is_dir()) {
+        return Err(Error::path(path, format!("there is no folder {}", missing.display())));
+    }
+    let is_empty = || std::fs::read_dir(path).is_ok_and(|mut all| all.next().is_none());
+    if !path.exists() || is_empty() {
         return Ok(());
     }
-    let failed = |e| Error::io(path, "reading", e);
-    let is_own = |name: &OsStr| {
-        name == "index.html" || name == PROGRAM_NAME || Path::new(name).extension().is_some_and(|end| end == "wspl")
-    };
-    let names = std::fs::read_dir(path).map_err(failed)?.map(|entry| entry.map(|entry| entry.file_name()));
-    let names = names.collect::<io::Result<Vec<_>>>().map_err(failed)?;
-    if !path.join(PROGRAM_NAME).is_file() {
+    let page = std::fs::read_to_string(path.join("index.html")).unwrap_or_default();
+    if !path.is_dir() || page.is_empty() || !path.join(PROGRAM_NAME).is_file() {
         return Err(Error::path(path, "exists already, and is no folder of a page"));
     }
+    let listed =
+        |name: &OsStr| page.contains(&format!("\"file\":{{\"name\":{}", serde_json::json!(name.to_string_lossy())));
+    let is_own = |name: &OsStr| name == "index.html" || name == PROGRAM_NAME || listed(name);
+    let names =
+        std::fs::read_dir(path).and_then(|all| all.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>());
+    let names = names.map_err(|e| Error::io(path, "reading", e))?;
     if let Some(other) = names.iter().find(|name| !is_own(name)) {
         return Err(Error::path(path.join(other), "is not a part of the page: move it away, or write another folder"));
     }
@@ -133,7 +143,10 @@ impl<'a> Shown<'a> {
         }
         let place = folder.place(&self.name);
         if self.name == "index.html" || place.exists() {
-            return Err(Error::input(self.path, "has the name of a file of the page: rename it"));
+            return Err(Error::setting(
+                "inputs",
+                format!("{} has the name of a file of the page: rename it", self.name),
+            ));
         }
         let failed = |e| Error::io(self.path, "copying", e);
         let mut from = files::open(self.path)?;
@@ -145,25 +158,22 @@ impl<'a> Shown<'a> {
         let version = &self.file.id().to_string()[..8]; // no old bytes of a cache
         Ok(format!("./{}?{version}", encoded(&self.name)))
     }
+}
 
-    /// The origin of an address: scheme, host and port.
-    fn host(&self) -> Option<Result<String>> {
-        let address = is_address(self.path).then(|| self.path.to_string_lossy())?;
-        let refused = |what: &str| Err(Error::input(public_name(self.path), what));
-        let Some((scheme @ ("https" | "http"), rest)) = address.split_once("://") else {
-            return Some(refused("browsers read files at https:// and http:// only"));
-        };
-        if public_name(self.path).as_os_str() != OsStr::new(&*address) {
-            return Some(refused("a page cannot keep the secrets of this address"));
-        }
-        let host = rest.split('/').next().unwrap_or_default();
-        let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-.:".contains(letter);
-        Some(if host.chars().all(is_plain) {
-            Ok(format!("{scheme}://{host}"))
-        } else {
-            refused("has a host with other letters than a-z, digits, dots and dashes")
-        })
+/// The origin of an address: scheme, host and port. None for a path.
+fn host(path: &Path) -> Option<Result<String>> {
+    let address = is_address(path).then(|| path.to_string_lossy())?;
+    let refused = |what: &str| Err(Error::setting("inputs", format!("{}: {what}", public_name(path).display())));
+    let Some((scheme @ ("https" | "http"), rest)) = address.split_once("://") else {
+        return Some(refused("browsers read files at https:// and http:// only"));
+    };
+    if public_name(path).as_os_str() != OsStr::new(&*address) {
+        return Some(refused("a page would tell everybody its user name, or what follows ? or #"));
     }
+    let host = rest.split('/').next().unwrap_or_default();
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-.:".contains(letter);
+    let has_other = "has a host with other letters than a-z, digits, dots and dashes";
+    Some(if host.chars().all(is_plain) { Ok(format!("{scheme}://{host}")) } else { refused(has_other) })
 }
 
 /// An error if a setting names a file: the page would not have it.

@@ -16,6 +16,7 @@ const DENSER = 1.2; // sharp pictures have this many times as many pixels along 
 
 // Coarse pictures: the pixels of their longer side, and their level of detail. Each mode takes those that answer in time.
 const COARSER = [[288, 1], [288, 2], [192, 2], [128, 3]], FIRST = { composite: 2, iso: 2 }, ELSE = 1;
+const LEAST_VOXELS = 24; // along the longest side of a coarse picture's volume
 const SOON = 25, LATE = 70; // milliseconds: two quicker answers make the next ones finer, two slower ones coarser
 const SLOWEST = 2 * LATE; // the full picture waits for coarse ones of the next frames unless one takes longer
 const SMOOTH = 60; // milliseconds that a full picture may take to be played
@@ -87,7 +88,8 @@ class Live {
   measures(quality) {
     if (quality !== COARSE) return { size: quality === SHARP ? this.screenSize(SHARP_PIXELS) : this.fullSize(), lod: 0 };
     const [pixels, lod] = COARSER[this.rung(this.look.mode)], full = this.fullSize(), part = Math.min(1, pixels / Math.max(...full));
-    return { size: full.map(side => Math.max(1, Math.round(side * part))), lod: Math.min(this.facts.coarsest, lod) };
+    const most = Math.max(0, Math.floor(Math.log2(Math.max(...this.facts.dims) / LEAST_VOXELS)));
+    return { size: full.map(side => Math.max(1, Math.round(side * part))), lod: Math.min(this.facts.coarsest, lod, most) };
   }
 
   // The request for the pictures of some frames: fields of a PictureRequest, as the texts of its options.

@@ -1,42 +1,69 @@
 // The program itself in a worker of the page: WebAssembly, as src/web/lib.rs has it.
 
-let engine, reading = '';
+const ROUNDS = 8; // rounds of reading side by side; a question that needs more reads one part after another
+
+let engine, file, panic, wanted = [], isHurried = false, refused = null;
+const there = new Map(); // bytes of the file elsewhere that the program has not taken yet
 
 const bytesAt = (start, bytes) => new Uint8Array(engine.memory.buffer, start >>> 0, bytes), textAt = (start, bytes) => new TextDecoder().decode(bytesAt(start, bytes));
+const keyOf = (offset, bytes) => `${offset} ${bytes}`;
+
+// An error that says what is wrong. After any other one, the program is in no known state.
+class Refusal extends Error {}
 
 // What the program calls.
 const page = {
-  // Reads bytes of a file elsewhere. Says 1 if that fails, and why in `reading`.
-  read_far(offset, out, bytes) {
-    try {
-      bytesAt(out, bytes).set(rangeOf(self.file, offset, bytes));
-      return 0;
-    } catch (error) {
-      reading = error.message;
-      return 1;
-    }
+  has(offset, bytes) {
+    if (isHurried) readNow(offset, bytes);
+    else if (!there.has(keyOf(offset, bytes))) wanted.push([offset, bytes]);
+    return Number(there.has(keyOf(offset, bytes)));
   },
-  problem(out, most) {
-    const text = new TextEncoder().encode(reading).subarray(0, most);
-    bytesAt(out, text.length).set(text);
-    return text.length;
+  give(offset, out, bytes) {
+    bytesAt(out, bytes).set(there.get(keyOf(offset, bytes)));
+    there.delete(keyOf(offset, bytes));
   },
-  panicked(start, bytes) { self.panic = textAt(start, bytes); },
+  panicked(start, bytes) { panic = textAt(start, bytes); },
 };
 
-// Bytes of a file, by a request that this worker waits for.
-function rangeOf({ url, length, name }, offset, bytes) {
+// An error unless an answer has just these bytes.
+function check(status, contentRange, offset, bytes) {
+  const { name, length } = file, [from, whole] = (contentRange ?? '').replace('bytes ', '').split(/-\d+\//).map(Number);
+  if (status === 200) throw new Refusal(`${name}: its host sends whole files only; this page needs ranges of bytes`);
+  if (status !== 206) throw new Refusal(`${name}: its host answers ${status}`);
+  if (whole && whole !== length) throw new Refusal(`${name}: has changed since this page was made: ${length} bytes, now ${whole}`);
+  if (from !== offset && contentRange) throw new Refusal(`${name}: its host sends bytes from ${from} on instead of ${offset}`);
+}
+
+function keep(found, offset, bytes) {
+  if (found.byteLength !== bytes) throw new Refusal(`${file.name}: its host sends ${found.byteLength} bytes instead of ${bytes}`);
+  there.set(keyOf(offset, bytes), new Uint8Array(found));
+}
+
+const headers = (offset, bytes) => ({ Range: `bytes=${offset}-${offset + bytes - 1}` });
+const unread = () => new Refusal(`${file.name}: its host does not answer, or does not let this page read it (CORS), or sends it elsewhere`);
+
+async function read([offset, bytes]) {
+  const stop = new AbortController(), answer = await fetch(file.url, { headers: headers(offset, bytes), signal: stop.signal }).catch(() => { throw unread(); });
+  try {
+    check(answer.status, answer.headers.get('Content-Range'), offset, bytes);
+  } catch (error) {
+    stop.abort(); // it may be the whole file
+    throw error;
+  }
+  keep(await answer.arrayBuffer().catch(() => { throw unread(); }), offset, bytes);
+}
+
+// Reads a part while the program waits.
+function readNow(offset, bytes) {
   const request = new XMLHttpRequest();
-  request.open('GET', url, false);
+  request.open('GET', file.url, false);
   request.responseType = 'arraybuffer';
-  request.setRequestHeader('Range', `bytes=${offset}-${offset + bytes - 1}`);
-  try { request.send(); } catch { throw new Error(`${name}: its host does not answer, or does not let this page read it (CORS), or sends it elsewhere`); }
-  const found = new Uint8Array(request.response ?? 0), whole = request.getResponseHeader('Content-Range')?.split('/')[1];
-  if (request.status === 200) throw new Error(`${name}: its host sends whole files only; this page needs ranges of bytes`);
-  if (request.status !== 206) throw new Error(`${name}: its host answers ${request.status}`);
-  if (Number(whole) && Number(whole) !== length) throw new Error(`${name}: has changed since this page was made: ${length} bytes, now ${whole}`);
-  if (found.length !== bytes) throw new Error(`${name}: its host sends ${found.length} bytes instead of ${bytes}`);
-  return found;
+  request.setRequestHeader('Range', headers(offset, bytes).Range);
+  try {
+    try { request.send(); } catch { throw unread(); }
+    check(request.status, request.getResponseHeader('Content-Range'), offset, bytes);
+    keep(request.response, offset, bytes);
+  } catch (error) { refused = error; }
 }
 
 function given(bytes) {
@@ -45,31 +72,33 @@ function given(bytes) {
   return [start, bytes.length];
 }
 
-// An answer that says what is wrong. After any other error, the program is in no known state.
-class Refusal extends Error {}
-
-// The answer to a question, in bytes.
-function ask(name, body) {
-  const isError = engine.ask(...given(new TextEncoder().encode(name)), ...given(body));
-  if (isError) throw new Refusal(textAt(engine.answer(), engine.answer_bytes()));
-  return bytesAt(engine.answer(), engine.answer_bytes()).slice();
+// The answer to a question, in bytes. If it needs more of the file, that is read, and the question is asked again.
+async function ask(name, body) {
+  there.clear();
+  for (let round = 0; ; round++) {
+    [wanted, refused, isHurried] = [[], null, round >= ROUNDS];
+    const isError = engine.ask(...given(new TextEncoder().encode(name)), ...given(body)), [start, bytes] = [engine.answer(), engine.answer_bytes()];
+    if (!isError) return bytesAt(start, bytes).slice();
+    if (!wanted.length) throw refused ?? new Refusal(textAt(start, bytes));
+    await Promise.all(wanted.map(read));
+  }
 }
 
 const json = value => new TextEncoder().encode(JSON.stringify(value));
 
-async function begin({ module, memory, file: { bytes, request, ...file } }) {
-  self.file = file;
+async function begin({ module, memory, file: { bytes, request, ...about } }) {
+  file = about;
   engine = (await WebAssembly.instantiate(module, { page })).exports;
-  if (bytes) ask('bytes', bytes);
-  ask('open', json({ name: file.name, far: bytes ? null : file.length, memory, request }));
+  if (bytes) await ask('bytes', bytes);
+  await ask('open', json({ name: file.name, far: bytes ? null : file.length, memory, request }));
 }
 
 self.onmessage = async ({ data: { begins, name, body } }) => {
   try {
-    const answer = begins ? await begin(begins) : ask(name, body);
+    const answer = begins ? await begin(begins) : await ask(name, body);
     self.postMessage({ answer }, answer ? [answer.buffer] : []);
   } catch (error) {
     const isBroken = !(error instanceof Refusal);
-    self.postMessage({ error: isBroken ? `the program of this page stopped, perhaps for lack of memory: ${self.panic ?? error.message}` : error.message, isBroken });
+    self.postMessage({ error: isBroken ? `the program of this page stopped, perhaps for lack of memory: ${panic ?? error.message}` : error.message, isBroken });
   }
 };

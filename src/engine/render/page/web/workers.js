@@ -20,7 +20,7 @@ class Workers {
   // The program, and the file or where it is.
   async read({ name, length, request, url, program }) {
     const within = element('file'), far = url && new URL(url, location.href).href;
-    const [packed] = await Promise.all([program ? fetched(program) : bytesOf(element('program').textContent), far && checkRanges(far, name)]);
+    const packed = program ? await fetched(program) : bytesOf(element('program').textContent);
     const module = await WebAssembly.compile(await inflated(packed)), bytes = within && bytesOf(within.textContent);
     within?.remove(); // its text takes memory
     return { module, file: { name, length, request, url: far, bytes } };
@@ -37,13 +37,6 @@ async function fetched(address) {
   const answer = await fetch(address).catch(() => null);
   if (answer?.ok) return new Uint8Array(await answer.arrayBuffer());
   throw new Error(answer ? `${address}: the host answers ${answer.status}` : `${address} cannot be read: this folder opens from a server, not from the disk; or the server does not answer`);
-}
-
-// An error unless the host of a file answers ranges, found out before it sends the whole file.
-async function checkRanges(address, name) {
-  const answer = await fetch(address, { headers: { Range: 'bytes=0-0' } }).catch(() => null);
-  answer?.body?.cancel();
-  if (answer?.status === 200) throw new Error(`${name}: its host sends whole files only; this page needs ranges of bytes`);
 }
 
 // A worker that answers one question after another. Nothing interrupts it: if it works too long on what nobody wants, another
