@@ -271,7 +271,8 @@ class Live {
     let at = 4 + length;
     for (const [{ first }, size] of blocks) {
       const { pictures } = await readBlock(bytes.subarray(at, at += size));
-      pictures.forEach((planes, n) => kept.set(frames[0] + first + n, { planes, about, backdrop, shares, quality }));
+      const number = n => frames[0] + first + n; // a picture that is shown already stays
+      pictures.forEach((planes, n) => kept.has(number(n)) || kept.set(number(n), { planes, about, backdrop, shares, quality }));
     }
     if (errors) this.showErrors(kept, frames[0], (await readBlock(bytes.subarray(at, at + errors))).pictures);
     return kept;
