@@ -47,7 +47,7 @@ pub extern "C" fn answer_bytes() -> usize {
 /// The bytes of a range.
 ///
 /// # Safety
-/// The range is one of [`reserve`], and nobody uses it any more.
+/// [`reserve`] made the range, and this call is the last to use it.
 unsafe fn taken(start: *mut u8, bytes: usize) -> Vec<u8> {
     // SAFETY: `reserve` made it as a box of a slice of so many bytes.
     unsafe { Box::from_raw(std::ptr::slice_from_raw_parts_mut(start, bytes)) }.into_vec()

@@ -33,12 +33,12 @@ impl Storage for FarFile {
         if !are_there.fold(true, |all, is_there| all & is_there) {
             return Err(missing());
         }
-        let copied = |(range, bytes): (&Range<u64>, &usize)| {
-            let mut out = vec![0; *bytes];
-            host::copy(range.start, &mut out);
+        let copied = |offset: u64, bytes: usize| {
+            let mut out = vec![0; bytes];
+            host::copy(offset, &mut out);
             out
         };
-        Ok(ranges.iter().zip(&lengths).map(copied).collect())
+        Ok(ranges.iter().zip(lengths).map(|(range, bytes)| copied(range.start, bytes)).collect())
     }
 
     fn is_remote(&self) -> bool {

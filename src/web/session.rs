@@ -30,7 +30,7 @@ thread_local! {
 /// The answer to a question.
 ///
 /// # Errors
-/// Those of the session, a question that nobody knows, or one before a file is open.
+/// Those of the session, an unknown question, or a question before a file is open.
 pub(crate) fn answer(question: &str, body: Vec<u8>) -> Result<Vec<u8>> {
     match question {
         "bytes" => {

@@ -1,5 +1,5 @@
-//! What Unix adds to files, and clocks. Browsers have neither: nothing of a file is ever called there, since none can be
-//! opened, and no time passes.
+//! Unix's additions to files, and clocks. Browsers have neither: no file can be opened there, so these methods are never
+//! called, and the clock stands still.
 
 #[cfg(not(target_family = "wasm"))]
 pub use std::os::unix::fs::{FileExt, FileTypeExt, MetadataExt, PermissionsExt};

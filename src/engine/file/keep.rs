@@ -56,7 +56,7 @@ impl CoefficientFile {
         self.kept.iter().for_each(|kept| kept.begin_run(Rank::Now));
     }
 
-    /// The same for what nobody waits for yet: it keeps only what fits beside all that is kept.
+    /// Begins a picture that is drawn before a user asks for it. It replaces no block that is kept.
     pub fn begin_run_ahead(&self) {
         self.kept.iter().for_each(|kept| kept.begin_run(Rank::Ahead));
     }

@@ -47,7 +47,7 @@ impl Question {
             "series" => Self::Series(json(body)?),
             "command" => view().and_then(file).map(|(view, file)| Self::Command(view, file))?,
             "save" => view().and_then(file).map(|(view, file)| Self::Save(view, file))?,
-            _ => return Err(wrong(format!("nobody knows the question `{name}`"))),
+            _ => return Err(wrong(format!("unknown question `{name}`"))),
         })
     }
 

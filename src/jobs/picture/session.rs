@@ -35,7 +35,7 @@ pub struct Session {
     shared: Arc<Shared>,
     /// Bytes of memory that pictures may take.
     pub(super) memory: usize,
-    /// Whether nobody waits for the pictures yet.
+    /// Whether pictures are drawn before a user asks for them.
     is_ahead: bool,
 }
 

@@ -48,7 +48,7 @@ pub struct ViewRequest {
     /// Whether to answer in few bytes, for slow networks.
     #[serde(default)]
     pub(super) packed: bool,
-    /// Whether nobody waits for the answer yet.
+    /// Whether the page asks before its user does.
     #[serde(default)]
     pub(super) ahead: bool,
     /// The file that is asked for, if one is.

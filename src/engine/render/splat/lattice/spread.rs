@@ -157,7 +157,7 @@ impl Placed {
         sums
     }
 
-    /// The cells, and their sums, of the value 1 at all voxels along u (0) or v (1), of which the first reaches `cell`.
+    /// Spreads the value 1 of all voxels along u (0) or v (1). Gives each cell with its sum; the first voxel begins at `cell`.
     fn cells_of_ones(&self, i: usize, cell: isize, weights: &CellWeights) -> Vec<(isize, f64)> {
         let Shear { fineness, .. } = self.spreading.shear;
         let mut sums = vec![0.0; fineness * self.count[i].saturating_sub(1) + weights.len()];
