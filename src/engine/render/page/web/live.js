@@ -171,9 +171,9 @@ class Live {
     else this.fillLater(index);
   }
 
-  // Loads coarse pictures of the frames that a user who steps through time sees next.
+  // Loads coarse pictures of the frames that a user who steps through time sees next, and of the one behind.
   async loadNext(index, step, wanted) {
-    const last = this.sequences[0].pictures.length - 1, [one, other] = [index + step, index + STEPS * step].map(frame => clamped(frame, 0, last));
+    const last = this.sequences[0].pictures.length - 1, [one, other] = [index - step, index + STEPS * step].map(frame => clamped(frame, 0, last));
     await new Promise(next => setTimeout(next)); // the picture is drawn meanwhile
     if (wanted === this.wanted && this.underWay?.rank !== PLOT) await this.loadMissing([Math.min(one, other), Math.max(one, other) + 1], COARSE).catch(problem);
   }
@@ -351,6 +351,7 @@ class Live {
   async loadMissing([first, end], quality) {
     const isThere = frame => this.found(quality, frame) || quality === COARSE && this.found(FULL, frame);
     const { wanted, engine: { together = end - first } } = this;
+    while (end > first && isThere(end - 1)) end -= 1;
     for (let frame = first; frame < end && wanted === this.wanted; frame++) {
       if (isThere(frame)) continue;
       const frames = [frame, Math.min(frame + together, end)];
