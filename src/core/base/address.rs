@@ -43,11 +43,11 @@ pub fn refuse_frames(inputs: &[PathBuf]) -> Result<()> {
     remote.map_or(Ok(()), |input| Err(Error::path(public_name(input), what)))
 }
 
-/// An address without its secrets: user name, password, and signatures in the query.
+/// An address without its secrets: user name, password, and signatures in the query. Paths stay as they are.
 pub fn public_name(address: &Path) -> PathBuf {
     let text = address.to_string_lossy();
-    let text = text.split(['?', '#']).next().unwrap_or_default();
-    let Some((scheme, rest)) = text.split_once("://") else { return text.into() };
+    let Some((scheme, rest)) = text.split_once("://") else { return address.into() };
+    let rest = rest.split(['?', '#']).next().unwrap_or_default();
     let (host, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
     let host = host.rsplit('@').next().unwrap_or_default();
     format!("{scheme}://{host}{path}").into()
@@ -73,6 +73,7 @@ mod tests {
             ("https://me:secret@host:80/a/run.wspl?X-Amz-Signature=1#x", "https://host:80/a/run.wspl"),
             ("https://host", "https://host"),
             ("s3://bucket/a@b/run.wspl", "s3://bucket/a@b/run.wspl"),
+            ("runs/what?#1.wspl", "runs/what?#1.wspl"),
         ] {
             assert_eq!(public_name(Path::new(address)), Path::new(name));
         }

@@ -215,8 +215,13 @@ impl BlockGrid {
 
     /// Sorts blocks so that those of each 2 x 2 x 2, 4 x 4 x 4, ... follow each other.
     pub fn sort_nested(&self, blocks: &mut [usize]) {
+        blocks.sort_by_cached_key(|block| self.place_in_nested(*block));
+    }
+
+    /// A number that ascends from block to block in the order of [`Self::sort_nested`].
+    pub fn place_in_nested(&self, block: usize) -> u64 {
         let [cx, cy, _] = self.counts();
-        blocks.sort_by_cached_key(|block| interleaved([block % cx, block / cx % cy, block / (cx * cy)]));
+        interleaved([block % cx, block / cx % cy, block / (cx * cy)])
     }
 
     /// The numbers of the blocks that touch `region`, ascending.

@@ -8,13 +8,12 @@ use super::decode::{Block, WantedFrames};
 use crate::base::sample;
 use wavesplat_format::BlockEntry;
 
-/// The coarsest level of detail that is used. Its nodes are exactly those of the first level part, so a coarser one
-/// would save no bytes.
+/// The coarsest level of detail that saves bytes within the last tier. Its nodes are exactly those of the first level part.
 const COARSEST: u32 = 2;
 
-/// The level of detail at which to decode every `stride`-th voxel, a power of two.
-pub fn level_of(stride: usize) -> u32 {
-    stride.trailing_zeros().min(COARSEST)
+/// The level of detail at which to decode every `stride`-th voxel, a power of two. Each tier above leaves one level out.
+pub fn level_of(codec: &WindowCodec, stride: usize) -> u32 {
+    stride.trailing_zeros().min(u32::from(codec.tiers()) + COARSEST)
 }
 
 /// Every `stride`-th voxel along each axis of a block of `size` voxels, in some frames of the window: frame after frame, x

@@ -40,12 +40,14 @@ type Slot = Arc<Mutex<Option<Arc<Field<'static>>>>>;
 /// The decoded blocks take at most one part in so many of a memory budget.
 const SHARE: usize = 8;
 
-impl AboveBlocks {
-    /// Room for the blocks of `bytes` bytes each that fit in their share of a memory budget; at least one.
-    pub(crate) fn within(memory: usize, bytes: usize) -> Self {
-        Self::new(most_within(memory, bytes))
-    }
+/// The same at coarser levels of detail, where other blocks take little.
+const SHARE_COARSE: usize = 2;
 
+/// A block, those above it in three tiers, and a larger share for them: with fewer, neighbours decode the same ones again.
+const CHAIN: usize = 4;
+const SHARE_OF_CHAIN: usize = 4;
+
+impl AboveBlocks {
     /// Room for so many blocks.
     pub(crate) fn new(most: usize) -> Self {
         Self { most: AtomicUsize::new(most), kept: Mutex::default(), leaves: Mutex::default() }
@@ -61,9 +63,9 @@ impl AboveBlocks {
         Self::new(self.most())
     }
 
-    /// Sets the limit to the blocks of `bytes` bytes each that fit in their share of another memory budget.
-    pub(super) fn limit(&self, memory: usize, bytes: usize) {
-        self.most.store(most_within(memory, bytes), Relaxed);
+    /// Sets the largest number of blocks that stay decoded.
+    pub(super) fn limit(&self, most: usize) {
+        self.most.store(most, Relaxed);
     }
 
     /// The first of some blocks that stay decoded together with those above them; at least one. Their window has so many tiers.
@@ -134,10 +136,11 @@ impl AboveBlocks {
     }
 }
 
-/// The number of blocks of `bytes` bytes each in their share of a memory budget.
-pub(crate) fn most_within(memory: usize, bytes: usize) -> usize {
-    let room = memory.saturating_sub(FIXED) / SHARE;
-    (room / bytes.max(1)).clamp(1, MOST)
+/// The number of blocks of `bytes` bytes each in their share of a memory budget, at a level of detail; at least one.
+pub(crate) fn most_within(memory: usize, bytes: usize, lod: u32) -> usize {
+    let within = |share: usize| memory.saturating_sub(FIXED) / share / bytes.max(1);
+    let most = within(if lod > 0 { SHARE_COARSE } else { SHARE }).max(within(SHARE_OF_CHAIN).min(CHAIN));
+    most.clamp(1, MOST)
 }
 
 /// More blocks would take longer to search than they save.
@@ -199,15 +202,16 @@ pub(super) fn bytes_above(m: &Metadata) -> usize {
     nodes_above(detail::whole(m).1) * tiered.map(bytes).max().unwrap_or(0)
 }
 
-/// An upper bound of the bytes of the decoded nodes of all blocks above others in a file.
-pub(super) fn bytes_of_all_above(m: &Metadata) -> usize {
+/// An upper bound of the bytes of the decoded nodes of all blocks above others in a file that a level of detail needs.
+pub(super) fn bytes_of_all_above(m: &Metadata, lod: u32) -> usize {
     let nodes = |tier: u8| {
         // Along an axis, a block has at most two nodes beyond its share: a ghost node, and one from rounding.
         let along = |axis: usize| (m.dims[axis].div_ceil(1 << tier) + 2 * m.blocks_per_axis(tier)[axis]) as f64;
         (0..3).map(along).product::<f64>()
     };
     let of_window = |window: &Window| {
-        let tiers = (1..=window.tiers()).map(nodes).sum::<f64>();
+        let finest = window.tiers().min(lod.max(1) as u8);
+        let tiers = (finest..=window.tiers()).map(nodes).sum::<f64>();
         tiers * f64::from(window.coefficients) * window.coefficient_size() as f64
     };
     (m.windows.iter().map(of_window).sum::<f64>() * f64::from(m.channels)) as usize

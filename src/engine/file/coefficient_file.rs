@@ -1,6 +1,6 @@
 //! An open coefficient file: the format's reader over any storage, in this library's terms.
 
-use crate::file::above::{AboveBlocks, bytes_above, nodes_above};
+use crate::file::above::{AboveBlocks, bytes_above, most_within, nodes_above};
 use crate::file::counted::Counted;
 use crate::file::damage::Damage;
 use crate::file::decoded::DecodedBlocks;
@@ -99,7 +99,7 @@ impl CoefficientFile {
         let m = reader.metadata();
         let (grid, blocks) = detail::whole(m);
         let colour_transform = colour_transform(m).map_err(failed)?;
-        let above = Arc::new(AboveBlocks::within(memory::DEFAULT, bytes_above(m)));
+        let above = Arc::new(AboveBlocks::new(most_within(memory::DEFAULT, bytes_above(m), 0)));
         Ok(Self {
             path,
             grid,
@@ -374,7 +374,7 @@ impl CoefficientFile {
         let codec = self.codec_of_all(window)?;
         // Blocks must begin on the lattice of those above.
         let on_lattice = if codec.tiers() > 0 { self.metadata().block_edge.trailing_zeros() } else { u32::MAX };
-        let lod = if refined { coarse::level_of(stride << self.lod).min(on_lattice) } else { 0 };
+        let lod = if refined { coarse::level_of(&codec, stride << self.lod).min(on_lattice) } else { 0 };
         Ok(WindowCodec { lod, ..codec })
     }
 

@@ -131,13 +131,13 @@ impl CoefficientFile {
     /// Keeps decoded blocks above others within their share of a memory budget, for this file and its clones. At first, the
     /// budget is [`DEFAULT`](wavesplat_core::base::memory::DEFAULT).
     pub fn limit_shared(&self, memory: usize) {
-        self.above.limit(memory, bytes_above(self.metadata()));
+        self.above.limit(most_within(memory, bytes_above(self.metadata()), self.lod));
     }
 
     /// An upper bound of the bytes of the decoded blocks above others within their share of a memory budget.
     pub fn shared_bytes(&self, memory: usize) -> usize {
         let each = bytes_above(self.metadata());
-        (most_within(memory, each) * each).min(bytes_of_all_above(self.metadata()))
+        (most_within(memory, each, self.lod) * each).min(bytes_of_all_above(self.metadata(), self.lod))
     }
 
     /// Extra bytes to decode a block in a file with tiers: its known nodes, and the block above while that is decoded, with `each`

@@ -75,11 +75,14 @@ fn decode_window(
     progress: &dyn Progress,
 ) -> Result<()> {
     let (window, codec, frames) = coarse(file, request, frames)?;
+    let wanted = wavelet::needed(&codec.synthesis, &frames);
     let decode = |entry: &BlockEntry| file.coarse(&codec, entry, request.thinning.stride, &frames);
     for entries in file.entries(window, channel, &request.region) {
-        let entries = entries?;
+        let mut entries = entries?;
+        entries.sort_by_cached_key(|entry| file.blocks.place_in_nested(entry.id.block as usize));
         for some in entries.chunks(TOGETHER) {
             progress.check()?;
+            file.decode_shared(&codec, some, &wanted)?;
             let decoded = some.par_iter().map(decode).collect::<Result<Vec<_>>>()?;
             some.iter().zip(decoded).for_each(|(entry, block)| put(request, entry.id.block as usize, &block, samples));
             progress.advance(some.len() as u64);

@@ -201,7 +201,8 @@ impl<B: Blend> SlicePass<'_, B> {
             };
             frames.par_iter_mut().for_each(|frame| frame.layers.fill(view, &region, fill(&frame.units)));
         }
-        let read: Vec<usize> = read.into_iter().map(|(block, _)| block).collect();
+        let mut read: Vec<usize> = read.into_iter().map(|(block, _)| block).collect();
+        blocks.sort_nested(&mut read); // so blocks that share those above follow each other
         let stats = self.reader.read(&read, &units, |read: &[BlockSamples]| {
             frames.par_iter_mut().enumerate().for_each(|(n, frame)| {
                 read.iter().for_each(|(region, samples)| frame.layers.put(view, region, &samples[n]));
