@@ -83,6 +83,35 @@ fn pages_answer_as_the_program_does() {
 }
 
 #[test]
+fn the_picture_within_a_page_is_the_one_of_the_program() {
+    let Some(mut browser) = Browser::start([760, 480]) else { return };
+    for (options, is_taken) in [("", true), ("-- --mode composite", true), ("-- --mode iso", false)] {
+        let work = converted("");
+        work.wavesplat(&format!("page a.wspl -o a.html {options}")).ok();
+        browser.open_file(&work.path("a.html"));
+        browser.wait(FULL);
+        assert_eq!(browser.js("Boolean(steering.live.facts.file.first)"), json!(is_taken), "{options}");
+        if !is_taken {
+            continue;
+        }
+        // As large as the page's own coarse picture, it has the same pixels.
+        let compared = browser.js(
+            "(async () => { const { live } = steering, { answer, scale } = live.facts.file.first, { look } = live.request([live.opening, live.opening + 1], 'coarse'); \
+             const own = partsOf(await live.engine.ask('pictures', { packed: true, look: { mode: look.mode, view: look.view, center: look.center, frames: look.frames, scale, size: '256x256' } })); \
+             const [[mine], [its]] = await Promise.all([answer, own].map(async ({ blocks: [[, block]] }) => (await readBlock(block)).pictures)); \
+             const same = cut(mine, 256, [256, 256], 1), half = cut(mine, 256, [128, 60], 2); \
+             const at = (x, y) => its[0][(2 * y + 256 / 2 - 60 + 1) * 256 + 2 * x + 1]; \
+             return [mine.length, mine.every((plane, p) => plane.every((n, i) => Object.is(n, its[p][i]) && Object.is(n, same[p][i]))), \
+             half[0].every((n, i) => Object.is(n, at(i % 128, Math.floor(i / 128))))]; })()",
+        );
+        assert_eq!(compared, json!([if options.is_empty() { 1 } else { 4 }, true, true]), "{options}");
+        browser.js("player.show(2)");
+        browser.wait(&format!("document.documentElement.dataset.drawn === '0:2' && {FULL}"));
+    }
+    assert!(browser.complaints.is_empty(), "{:?}", browser.complaints);
+}
+
+#[test]
 fn a_page_from_the_disk_does_what_the_viewer_does() {
     let Some(mut browser) = Browser::start([760, 480]) else { return };
     let work = converted("");
@@ -175,7 +204,7 @@ fn a_site_reads_the_parts_that_it_shows() {
     let fate = Arc::new(Mutex::new(Fate::Answer));
     let server = site(&work, &fate);
     browser.open(&format!("http://127.0.0.1:{}/", server.port()));
-    browser.wait("document.documentElement.dataset.drawn");
+    browser.wait("player.shown?.quality === 'full'");
     let asked = server.asked();
     let mut read = vec![false; work.read("a.wspl").len()];
     asked
@@ -199,6 +228,7 @@ fn a_site_reads_the_parts_that_it_shows() {
             "element('readout').textContent.includes('a.wspl') && element('readout').textContent.includes({})",
             json!(words)
         ));
+        browser.wait("player.shown.quality === 'coarse'"); // the picture within the page
     }
     *fate.lock().unwrap() = Fate::Answer;
     browser.open_file(&work.path("empty.html"));

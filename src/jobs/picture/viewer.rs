@@ -14,7 +14,7 @@ use super::session::Session;
 use super::values::{ModeName, PointSpec, ViewAngles};
 use super::view_request::{Saved, ViewRequest};
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 use wavesplat_core::base::address::public_name;
@@ -88,10 +88,19 @@ pub(super) struct FileOfPage {
     pub(super) length: u64,
     /// The settings of all pictures.
     pub(super) request: PictureRequest,
-    /// What an answer would say of the first picture, with its automatic colours: they take longer than the picture.
-    pub(super) first: Option<Value>,
+    /// A picture of what the page shows first, which shows until the program has started.
+    pub(super) first: Option<FirstPicture>,
     /// Bytes of memory for coarse pictures, and for others.
     pub(super) memory: [usize; 2],
+}
+
+/// A square picture with all of the volume.
+#[derive(Debug, Serialize)]
+pub(super) struct FirstPicture {
+    /// A packed answer, in base64.
+    answer: String,
+    /// Pixels of a world unit.
+    scale: f64,
 }
 
 /// The head of an answer, which comes before its blocks.
@@ -155,27 +164,28 @@ impl ViewerSession {
     pub(super) fn facts_with(&self, mut file: Option<FileOfPage>) -> Result<String> {
         let known = self.known()?;
         if let Some(file) = &mut file {
-            file.first = self.first_head(&known)?;
+            file.first = self.first_picture(&known)?;
         }
         serde_json::to_string(&Facts { file, ..known }).map_err(|e| Error::setting("facts", e.to_string()))
     }
 
-    /// The head of the answer to a small picture of what the page shows first. None if the page chooses a surface or a slice.
-    fn first_head(&self, Facts { mode, opening, center: [x, y, z], radius, .. }: &Facts) -> Result<Option<Value>> {
-        const SIDE: f64 = 64.0;
+    /// A small picture of what the page shows first. None if the page chooses a surface or a slice.
+    fn first_picture(
+        &self,
+        Facts { mode, opening, center: [x, y, z], radius, .. }: &Facts,
+    ) -> Result<Option<FirstPicture>> {
+        const SIDE: f64 = 256.0;
         let is_left = |needing: ModeName, is_given: bool| *mode == needing.name() && !is_given;
         if is_left(ModeName::Iso, self.base.iso.is_some()) || is_left(ModeName::Slice, !self.base.slice.is_empty()) {
             return Ok(None);
         }
-        let given = serde_json::to_value(&self.base).map_err(wrong)?;
-        let look = json!({ "look": {
-            "mode": mode, "frames": opening.to_string(), "size": format!("{SIDE}x{SIDE}"), "scale": SIDE / (2.0 * radius),
+        let (given, scale) = (serde_json::to_value(&self.base).map_err(wrong)?, 0.95 * SIDE / (2.0 * radius));
+        let request = json!({ "packed": true, "look": {
+            "mode": mode, "frames": opening.to_string(), "size": format!("{SIDE}x{SIDE}"), "scale": scale,
             "view": ["30,30"], "center": format!("{x},{y},{z}"), "iso": given["iso"], "slice": given["slice"],
         }});
-        let answer = self.pictures(&ViewRequest::read(look.to_string().as_bytes())?, &CancelToken::default())?;
-        let (length, rest) = answer.split_at(size_of::<u32>());
-        let length = length.try_into().map_or(0, u32::from_le_bytes) as usize;
-        serde_json::from_slice(&rest[..length]).map(Some).map_err(wrong)
+        let answer = self.pictures(&ViewRequest::read(request.to_string().as_bytes())?, &CancelToken::default())?;
+        Ok(Some(FirstPicture { answer: page::text_of(&answer), scale }))
     }
 
     fn known(&self) -> Result<Facts> {
@@ -187,11 +197,9 @@ impl ViewerSession {
         let middle = |axis: usize| grid.origin[axis] + (sides[axis] - grid.spacing[axis]) / 2.0;
         let frames = frames_of(&self.base, scene.frames().unwrap_or(0))?;
         let opening = opening_of(scene.as_mut(), file.as_deref(), &frames, self.session.memory, &Silent)?;
-        let name = self.session.paths().first().map(|input| public_name(input));
-        let name = name.as_deref().and_then(Path::file_name);
         Ok(Facts {
             live: true,
-            title: name.unwrap_or_default().to_string_lossy().into_owned(),
+            title: self.session.paths().first().map(|input| shown_name(input)).unwrap_or_default(),
             labels: (0..scene.frames().unwrap_or(0)).map(|frame| annotation.stamp(frame)).collect(),
             opening: opening.frame,
             mode: self.first_mode(opening).name(),
@@ -364,6 +372,11 @@ impl Histogram {
         let end = if most - common >= common - least { most } else { least };
         Self { range, counts, surface: Some((common + end) / 2.0) }
     }
+}
+
+/// The name of an input in a page: that of the file, without its folder or host.
+pub(super) fn shown_name(input: &Path) -> String {
+    public_name(input).file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Refuses pictures of more numbers than half of the memory takes.

@@ -3,7 +3,7 @@
 //! `program.zz` is `src/web`, as `tools/release/program.sh` builds it and packs it by zlib.
 
 use super::request::PictureRequest;
-use super::viewer::{FileOfPage, ViewerSession};
+use super::viewer::{FileOfPage, ViewerSession, shown_name};
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io;
@@ -117,9 +117,7 @@ impl<'a> Shown<'a> {
             return Err(Error::setting("inputs", "a page shows coefficient files: convert frames first"));
         };
         refuse_files(&viewer.base)?;
-        let plain = if is_address(path) { public_name(path) } else { path.clone() };
-        let name = plain.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { viewer, path, name, file: viewer.session.file(false)? })
+        Ok(Self { viewer, path, name: shown_name(path), file: viewer.session.file(false)? })
     }
 
     /// The facts about the scene for a page that finds the file at an address, or within itself.

@@ -98,14 +98,14 @@ impl Engine<'_> {
         }
     }
 
-    /// The parts that workers take from the page.
+    /// The parts that workers take from the page. They come last, for the page begins to work before they are read.
     fn parts(self) -> String {
         let part = |id: &str, text: &str| format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n");
         match self {
             Self::Server => String::new(),
             Self::Beside { .. } => part("worker", WORKER),
             Self::Within { program, file } => {
-                part("worker", WORKER) + &part("program", &BASE64.encode(program)) + &part("file", &BASE64.encode(file))
+                part("worker", WORKER) + &part("program", &text_of(program)) + &part("file", &text_of(file))
             }
         }
     }
@@ -121,11 +121,17 @@ pub fn write_asking(out: &mut dyn Write, nonce: &str, title: &str, facts: &str, 
         "sources" => Some(engine.sources()),
         "controls" => Some(CONTROLS.into()),
         "saving" => Some(SAVING.trim_end().into()),
-        "blocks" => Some(engine.parts()),
+        "blocks" => Some(String::new()),
+        "parts" => Some(engine.parts()),
         "about" => Some(in_script(facts)),
         "script" => Some(engine.scripts()),
         _ => None,
     })
+}
+
+/// Bytes as a text, as the page's scripts read it.
+pub fn text_of(bytes: &[u8]) -> String {
+    BASE64.encode(bytes)
 }
 
 /// A JSON text for a script element, where "<" could begin its end tag.
@@ -142,7 +148,7 @@ pub(crate) fn write_block(
     block: &[u8],
 ) -> io::Result<()> {
     let attributes = format!(r#"data-sequence="{sequence}" data-first="{first}" data-count="{count}""#);
-    writeln!(out, r#"<script type="text/plain" class="block" {attributes}>{}</script>"#, BASE64.encode(block))
+    writeln!(out, r#"<script type="text/plain" class="block" {attributes}>{}</script>"#, text_of(block))
 }
 
 /// Ends the page.
@@ -153,6 +159,7 @@ pub(crate) fn end(out: &mut dyn Write, nonce: &str, about: &About) -> io::Result
         "about" => Some(text.clone()),
         "script" => Some(format!("{SCRIPT}{START}")),
         "nonce" => Some(nonce.into()),
+        "parts" => Some(String::new()),
         _ => None,
     })
 }

@@ -23,6 +23,21 @@ const SMOOTH = 60; // milliseconds that a full picture may take to be played
 
 class Stale extends Error {}
 
+// The parts of an answer: the description of its pictures, their blocks, and one with their errors.
+function partsOf(bytes) {
+  let at = 4 + new DataView(bytes.buffer).getUint32(0, true);
+  const { about, blocks, errors, opacity } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, at)));
+  const part = size => bytes.subarray(at, at += size);
+  return { about: { ...about, opacity }, blocks: blocks.map(([frames, size]) => [frames, part(size)]), errors: errors && part(errors) };
+}
+
+// Pixels of a square picture at the places of those of another one with the same middle and so many pixels for one of it.
+function cut(planes, side, [width, height], scale) {
+  const place = count => Int32Array.from({ length: count }, (_, n) => clamped(Math.round((n + 0.5 - count / 2) * scale + side / 2 - 0.5), 0, side - 1));
+  const [across, down] = [place(width), place(height)];
+  return planes.map(plane => Float32Array.from({ length: width * height }, (_, n) => plane[down[Math.floor(n / width)] * side + across[n % width]]));
+}
+
 // Numbers with nine digits: a picture of 4096 pixels shows no more.
 const short = number => Number(number.toPrecision(9)), texts = numbers => numbers.map(short).join();
 
@@ -53,8 +68,11 @@ class Live {
     this.wanted = 0; // how many requests of the user there were
     this.waiting = 0; // and how many of them wait
     this.isMoving = false;
-    const { about, opacity } = facts.file?.first ?? {};
-    if (about) this.learnColours(`${this.firstMode} `, { ...about, opacity }, FULL);
+    this.embedded = facts.file?.first; // a picture of what is shown first
+    if (this.embedded) {
+      this.embedded.answer = partsOf(bytesOf(this.embedded.answer));
+      this.learnColours(`${this.firstMode} `, this.embedded.answer.about, FULL);
+    }
   }
 
   // What the address keeps.
@@ -158,6 +176,7 @@ class Live {
     this.index = index;
     clearTimeout(this.filling);
     const wanted = ++this.wanted, qualities = this.qualities(isPlaying);
+    if (this.embedded) await this.takeEmbedded(index);
     const best = QUALITIES.findLast(quality => quality !== COARSE && this.found(quality, index));
     if (best) yield this.found(best, index);
     for (const quality of qualities.filter(quality => QUALITIES.indexOf(quality) > QUALITIES.indexOf(best))) {
@@ -169,6 +188,28 @@ class Live {
     if (wanted !== this.wanted || this.isMoving) return;
     if (isPlaying) this.playAhead(qualities[0], index);
     else this.fillLater(index);
+  }
+
+  // Takes the picture that the page has of what it shows first for a coarse one, if this is what is seen.
+  async takeEmbedded(index) {
+    const { answer: { about, blocks: [[, block]] }, scale } = this.embedded, { archive, ...state } = this.state;
+    this.embedded = null;
+    if (index !== this.opening || Object.values(state).some(value => (value ?? null) !== null)) return;
+    const { size } = this.measures(COARSE), [side] = about.size, { pictures: [planes] } = await readBlock(block), finer = scale / this.scaleIn(size);
+    this.describe(Object.assign(about, { size, mode: this.look.mode }));
+    const [ray] = about.rays, [x, y] = size.map(count => (0.5 - count / 2) * finer + side / 2 - 0.5);
+    const times = (vector, factor) => vector.map(number => number * factor);
+    const rays = ray && { ...ray, from: ray.from.map((at, a) => at + x * ray.right[a] + y * ray.down[a]), right: times(ray.right, finer), down: times(ray.down, finer) };
+    const picture = { planes: cut(planes, side, size, finer), about: { ...about, rays: [rays] }, backdrop: null, shares: rays && sharesOf(rays, size), quality: COARSE };
+    this.remembered(this.key(COARSE)).set(index, picture);
+  }
+
+  // Completes the description of pictures.
+  describe(about) {
+    const { title, labels, maps } = this.facts;
+    this.kind = about.kind;
+    for (const name in about.maps) about.maps[name] = bytesOf(about.maps[name]);
+    Object.assign(about, { maps: { ...maps, ...about.maps }, title, labels });
   }
 
   // Loads coarse pictures of the frames that a user who steps through time sees next, and of the one behind.
@@ -256,25 +297,20 @@ class Live {
     const { stop, rank, isSpare } = this.underWay, request = { ...this.request(frames, quality), ahead: isSpare };
     const bytes = await this.answer('pictures', request, { signal: stop.signal, isCoarse: quality === COARSE }, rank), ended = performance.now();
     if (!this.underWay?.waits) this.learnPace(mode, quality, (ended - begun) / (frames[1] - frames[0]), frames); // not for what was stopped
-    const length = new DataView(bytes.buffer).getUint32(0, true);
-    const { about, blocks, errors, opacity } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
-    this.kind = about.kind;
-    for (const name in about.maps) about.maps[name] = bytesOf(about.maps[name]);
-    const { title, labels } = this.facts;
-    Object.assign(about, { maps: { ...this.facts.maps, ...about.maps }, title, labels, opacity });
+    const { about, blocks, errors } = partsOf(bytes);
+    this.describe(about);
     this.lacksErrors = mode === 'error' && !errors; // frames that were not converted have none
     about.mode = this.lacksErrors ? 'mean' : mode;
     if (mode === 'slice') this.ofSlices = colours;
     if (!isChosen) this.learnColours(colours, about, quality);
     const kept = this.remembered(key), decoding = about.backdrops[0] ? pixelsOf(about.backdrops[0], about.size) : null;
     const shares = about.rays[0] && sharesOf(about.rays[0], about.size), backdrop = await decoding;
-    let at = 4 + length;
-    for (const [{ first }, size] of blocks) {
-      const { pictures } = await readBlock(bytes.subarray(at, at += size));
+    for (const [{ first }, block] of blocks) {
+      const { pictures } = await readBlock(block);
       const number = n => frames[0] + first + n; // a picture that is shown already stays
       pictures.forEach((planes, n) => kept.has(number(n)) || kept.set(number(n), { planes, about, backdrop, shares, quality }));
     }
-    if (errors) this.showErrors(kept, frames[0], (await readBlock(bytes.subarray(at, at + errors))).pictures);
+    if (errors) this.showErrors(kept, frames[0], (await readBlock(errors)).pictures);
     return kept;
   }
 

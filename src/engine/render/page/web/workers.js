@@ -8,22 +8,22 @@ class Workers {
   constructor(file) {
     this.blockTime = 300; // milliseconds that a block of full pictures may take: nothing stops it
     this.together = 1; // frames that are asked for together while nobody waits
-    const source = URL.createObjectURL(new Blob([element('worker').textContent], { type: 'text/javascript' }));
     const hand = memory => new Hand(file.url ? GRACE_FAR : GRACE, async () => {
       this.ready ??= this.read(file);
       this.ready.catch(() => { this.ready = null; }); // the next question tries again
-      return { source, begins: { memory, ...await this.ready } };
+      const { source, ...parts } = await this.ready;
+      return { source, begins: { memory, ...parts } };
     });
     [this.coarse, this.full] = file.memory.map(hand);
   }
 
   // The program, and the file or where it is.
   async read({ name, length, request, url, program }) {
-    const within = element('file'), far = url && new URL(url, location.href).href;
-    const packed = program ? await fetched(program) : bytesOf(element('program').textContent);
-    const module = await WebAssembly.compile(await inflated(packed)), bytes = within && bytesOf(within.textContent);
-    within?.remove(); // its text takes memory
-    return { module, file: { name, length, request, url: far, bytes } };
+    const far = url && new URL(url, location.href).href, packed = program ? await fetched(program) : bytesOf(await textOfPart('program', 'file'));
+    const module = await WebAssembly.compile(await inflated(packed)), bytes = far ? null : bytesOf(await textOfPart('file'));
+    element('file')?.remove(); // its text takes memory
+    this.source ??= URL.createObjectURL(new Blob([await textOfPart('worker')], { type: 'text/javascript' }));
+    return { source: this.source, module, file: { name, length, request, url: far, bytes } };
   }
 
   ask(name, body, { signal, isCoarse } = {}) {
@@ -31,6 +31,12 @@ class Workers {
   }
 
   async progress() { return null; }
+}
+
+// The text of a part of the page, as soon as the browser has read it: up to the next part, or all of the page.
+async function textOfPart(id, next) {
+  while (document.readyState === 'loading' && !(next && element(next))) await pause(5);
+  return element(id).textContent;
 }
 
 async function fetched(address) {
