@@ -83,20 +83,20 @@ fn pages_answer_as_the_program_does() {
 }
 
 #[test]
-fn the_picture_within_a_page_is_the_one_of_the_program() {
+fn the_preview_within_a_page_is_the_picture_of_the_program() {
     let Some(mut browser) = Browser::start([760, 480]) else { return };
     for (options, is_taken) in [("", true), ("-- --mode composite", true), ("-- --mode iso", false)] {
         let work = converted("");
         work.wavesplat(&format!("page a.wspl -o a.html {options}")).ok();
         browser.open_file(&work.path("a.html"));
         browser.wait(FULL);
-        assert_eq!(browser.js("Boolean(steering.live.facts.file.first)"), json!(is_taken), "{options}");
+        assert_eq!(browser.js("Boolean(steering.live.facts.file.preview)"), json!(is_taken), "{options}");
         if !is_taken {
             continue;
         }
         // As large as the page's own coarse picture, it has the same pixels.
         let compared = browser.js(
-            "(async () => { const { live } = steering, { answer, scale } = live.facts.file.first, { look } = live.request([live.opening, live.opening + 1], 'coarse'); \
+            "(async () => { const { live } = steering, { answer, scale } = live.facts.file.preview, { look } = live.request([live.opening, live.opening + 1], 'coarse'); \
              const own = partsOf(await live.engine.ask('pictures', { packed: true, look: { mode: look.mode, view: look.view, center: look.center, frames: look.frames, scale, size: '256x256' } })); \
              const [[mine], [its]] = await Promise.all([answer, own].map(async ({ blocks: [[, block]] }) => (await readBlock(block)).pictures)); \
              const same = cut(mine, 256, [256, 256], 1), half = cut(mine, 256, [128, 60], 2); \
@@ -228,7 +228,7 @@ fn a_site_reads_the_parts_that_it_shows() {
             "element('readout').textContent.includes('a.wspl') && element('readout').textContent.includes({})",
             json!(words)
         ));
-        browser.wait("player.shown.quality === 'coarse'"); // the picture within the page
+        browser.wait("player.shown.quality === 'coarse'"); // the preview within the page
     }
     *fate.lock().unwrap() = Fate::Answer;
     browser.open_file(&work.path("empty.html"));
@@ -245,6 +245,13 @@ fn damaged_files_end_in_a_message() {
     browser.open_file(&work.path("a.html"));
     browser.wait(FULL);
     let file = work.read("a.wspl");
+    let page = String::from_utf8(work.read("a.html")).unwrap();
+    let cut = page.find("id=\"file\"").unwrap() + 100;
+    work.write("cut.html", &page[..cut]);
+    browser.open_file(&work.path("cut.html"));
+    browser.wait("element('readout').textContent.includes('a.wspl is incomplete')");
+    browser.open_file(&work.path("a.html"));
+    browser.wait(FULL);
     for n in 0..24 {
         let mut bytes = file.clone();
         match n % 3 {
@@ -254,8 +261,9 @@ fn damaged_files_end_in_a_message() {
         }
         let told = browser.js(&format!(
             "(async () => {{ const {{ facts }} = steering.live, file = document.createElement('script'); [file.type, file.id, file.textContent] = ['text/plain', 'file', '{}']; \
-             document.body.append(file); return new Workers(facts.file).ask('pictures', {{ look: {{ scale: 3, size: '60x50', center: '12,10,8', frames: '0:12' }} }}).then(() => '', error => error.message); }})()",
-            BASE64.encode(&bytes)
+             document.body.append(file); return new Workers({{ ...facts.file, length: {} }}).ask('pictures', {{ look: {{ scale: 3, size: '60x50', center: '12,10,8', frames: '0:12' }} }}).then(() => '', error => error.message); }})()",
+            BASE64.encode(&bytes),
+            bytes.len()
         ));
         let told = told.as_str().unwrap();
         assert!(told.is_empty() || told.contains("a.wspl") && !told.contains("panicked"), "{n}: {told}");

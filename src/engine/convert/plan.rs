@@ -2,7 +2,7 @@
 
 use super::coded_input::CodedInput;
 use super::{ConvertConfig, SchemeConstraint, SpatialPredictor, settings, trial_boxes};
-use crate::file::above::{most_within, nodes_above};
+use crate::file::above::{OF_ONE_BLOCK, most_within, nodes_above};
 use crate::file::promise::UNIT_RANGE;
 use wavesplat_core::base::description::{coordinates, is_regular};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
@@ -304,7 +304,8 @@ fn room(input: &CodedInput, blocks: BlockGrid, tiers: u8, each: usize) -> Result
     let fits = |room: &Room| needs(room) + archive.memory <= config.memory;
     let largest = |kept_above| (1..=enough).rev().map(|flight| Room { flight, kept_above }).find(fits);
     // More threads save more than blocks that stay decoded.
-    let rooms = [1, most_within(config.memory, above, 0)].into_iter().filter_map(largest);
+    let most = most_within(config.memory, above, 0);
+    let rooms = (1..=most.min(OF_ONE_BLOCK)).chain([most]).filter_map(largest);
     rooms.max_by_key(threads).ok_or_else(|| {
         let share = config.memory as f64 / config.memory.saturating_sub(archive.memory).max(1) as f64;
         let least = (needs(&Room { flight: 1, kept_above: 1 }) as f64 * share / MIB).ceil();

@@ -40,12 +40,11 @@ type Slot = Arc<Mutex<Option<Arc<Field<'static>>>>>;
 /// The decoded blocks take at most one part in so many of a memory budget.
 const SHARE: usize = 8;
 
-/// The same at coarser levels of detail, where other blocks take little.
-const SHARE_COARSE: usize = 2;
+/// The same for the blocks above of one block, and at coarser levels of detail, where other blocks take little.
+const LARGER_SHARE: usize = 4;
 
-/// A block, those above it in three tiers, and a larger share for them: with fewer, neighbours decode the same ones again.
-const CHAIN: usize = 4;
-const SHARE_OF_CHAIN: usize = 4;
+/// Blocks above of one block, and one more: with fewer, its neighbours decode the same ones again.
+pub(crate) const OF_ONE_BLOCK: usize = 4;
 
 impl AboveBlocks {
     /// Room for so many blocks.
@@ -66,6 +65,7 @@ impl AboveBlocks {
     /// Sets the largest number of blocks that stay decoded.
     pub(super) fn limit(&self, most: usize) {
         self.most.store(most, Relaxed);
+        drop_oldest(&mut self.kept.lock().unwrap_or_else(PoisonError::into_inner), most);
     }
 
     /// The first of some blocks that stay decoded together with those above them; at least one. Their window has so many tiers.
@@ -130,16 +130,21 @@ impl AboveBlocks {
         let known = known.filter(|(of, _)| of == key).map(|(_, slot)| slot);
         let slot = known.or_else(|| decoded.cloned()).unwrap_or_default();
         kept.push((key.clone(), slot.clone()));
-        let old = kept.len().saturating_sub(self.most());
-        kept.drain(..old);
+        drop_oldest(&mut kept, self.most());
         slot
     }
+}
+
+fn drop_oldest(kept: &mut Vec<(AboveKey, Slot)>, most: usize) {
+    let old = kept.len().saturating_sub(most);
+    kept.drain(..old);
 }
 
 /// The number of blocks of `bytes` bytes each in their share of a memory budget, at a level of detail; at least one.
 pub(crate) fn most_within(memory: usize, bytes: usize, lod: u32) -> usize {
     let within = |share: usize| memory.saturating_sub(FIXED) / share / bytes.max(1);
-    let most = within(if lod > 0 { SHARE_COARSE } else { SHARE }).max(within(SHARE_OF_CHAIN).min(CHAIN));
+    let larger = within(LARGER_SHARE);
+    let most = if lod > 0 { larger } else { within(SHARE).max(larger.min(OF_ONE_BLOCK)) };
     most.clamp(1, MOST)
 }
 
@@ -202,16 +207,15 @@ pub(super) fn bytes_above(m: &Metadata) -> usize {
     nodes_above(detail::whole(m).1) * tiered.map(bytes).max().unwrap_or(0)
 }
 
-/// An upper bound of the bytes of the decoded nodes of all blocks above others in a file that a level of detail needs.
-pub(super) fn bytes_of_all_above(m: &Metadata, lod: u32) -> usize {
+/// An upper bound of the bytes of the decoded nodes of all blocks above others in a file.
+pub(super) fn bytes_of_all_above(m: &Metadata) -> usize {
     let nodes = |tier: u8| {
         // Along an axis, a block has at most two nodes beyond its share: a ghost node, and one from rounding.
         let along = |axis: usize| (m.dims[axis].div_ceil(1 << tier) + 2 * m.blocks_per_axis(tier)[axis]) as f64;
         (0..3).map(along).product::<f64>()
     };
     let of_window = |window: &Window| {
-        let finest = window.tiers().min(lod.max(1) as u8);
-        let tiers = (finest..=window.tiers()).map(nodes).sum::<f64>();
+        let tiers = (1..=window.tiers()).map(nodes).sum::<f64>();
         tiers * f64::from(window.coefficients) * window.coefficient_size() as f64
     };
     (m.windows.iter().map(of_window).sum::<f64>() * f64::from(m.channels)) as usize

@@ -137,7 +137,7 @@ impl CoefficientFile {
     /// An upper bound of the bytes of the decoded blocks above others within their share of a memory budget.
     pub fn shared_bytes(&self, memory: usize) -> usize {
         let each = bytes_above(self.metadata());
-        (most_within(memory, each, self.lod) * each).min(bytes_of_all_above(self.metadata(), self.lod))
+        (most_within(memory, each, self.lod) * each).min(bytes_of_all_above(self.metadata()))
     }
 
     /// Extra bytes to decode a block in a file with tiers: its known nodes, and the block above while that is decoded, with `each`

@@ -8,7 +8,7 @@ use super::plan::opening::{Opening, opening_of};
 use super::plan::ranges::distribution;
 use super::plan::ranges::distribution_of_frames;
 use super::reporter::Caller;
-use super::request::{PictureRequest, option, wrong};
+use super::request::{PictureRequest, option};
 use super::series::series_csv;
 use super::session::Session;
 use super::values::{ModeName, PointSpec, ViewAngles};
@@ -89,14 +89,14 @@ pub(super) struct FileOfPage {
     /// The settings of all pictures.
     pub(super) request: PictureRequest,
     /// A picture of what the page shows first, which shows until the program has started.
-    pub(super) first: Option<FirstPicture>,
+    pub(super) preview: Option<Preview>,
     /// Bytes of memory for coarse pictures, and for others.
     pub(super) memory: [usize; 2],
 }
 
 /// A square picture with all of the volume.
 #[derive(Debug, Serialize)]
-pub(super) struct FirstPicture {
+pub(super) struct Preview {
     /// A packed answer, in base64.
     answer: String,
     /// Pixels of a world unit.
@@ -164,28 +164,24 @@ impl ViewerSession {
     pub(super) fn facts_with(&self, mut file: Option<FileOfPage>) -> Result<String> {
         let known = self.known()?;
         if let Some(file) = &mut file {
-            file.first = self.first_picture(&known)?;
+            file.preview = self.preview(&known)?;
         }
         serde_json::to_string(&Facts { file, ..known }).map_err(|e| Error::setting("facts", e.to_string()))
     }
 
     /// A small picture of what the page shows first. None if the page chooses a surface or a slice.
-    fn first_picture(
-        &self,
-        Facts { mode, opening, center: [x, y, z], radius, .. }: &Facts,
-    ) -> Result<Option<FirstPicture>> {
+    fn preview(&self, Facts { mode, opening, center: [x, y, z], radius, .. }: &Facts) -> Result<Option<Preview>> {
         const SIDE: f64 = 256.0;
-        let is_left = |needing: ModeName, is_given: bool| *mode == needing.name() && !is_given;
-        if is_left(ModeName::Iso, self.base.iso.is_some()) || is_left(ModeName::Slice, !self.base.slice.is_empty()) {
+        if [ModeName::Iso, ModeName::Slice].iter().any(|chosen| chosen.name() == *mode) {
             return Ok(None);
         }
-        let (given, scale) = (serde_json::to_value(&self.base).map_err(wrong)?, 0.95 * SIDE / (2.0 * radius));
+        let scale = 0.95 * SIDE / (2.0 * radius); // the page repeats its edge, which is beyond the volume
         let request = json!({ "packed": true, "look": {
             "mode": mode, "frames": opening.to_string(), "size": format!("{SIDE}x{SIDE}"), "scale": scale,
-            "view": ["30,30"], "center": format!("{x},{y},{z}"), "iso": given["iso"], "slice": given["slice"],
+            "view": ["30,30"], "center": format!("{x},{y},{z}"), "shade": false,
         }});
         let answer = self.pictures(&ViewRequest::read(request.to_string().as_bytes())?, &CancelToken::default())?;
-        Ok(Some(FirstPicture { answer: page::text_of(&answer), scale }))
+        Ok(Some(Preview { answer: page::base64(&answer), scale }))
     }
 
     fn known(&self) -> Result<Facts> {

@@ -130,7 +130,7 @@ impl<'a> Shown<'a> {
             length: self.file.bytes(),
             request: self.viewer.base.clone(),
             memory: MEMORY,
-            first: None,
+            preview: None,
         }))
     }
 

@@ -105,7 +105,7 @@ impl Engine<'_> {
             Self::Server => String::new(),
             Self::Beside { .. } => part("worker", WORKER),
             Self::Within { program, file } => {
-                part("worker", WORKER) + &part("program", &text_of(program)) + &part("file", &text_of(file))
+                part("worker", WORKER) + &part("program", &base64(program)) + &part("file", &base64(file))
             }
         }
     }
@@ -129,8 +129,8 @@ pub fn write_asking(out: &mut dyn Write, nonce: &str, title: &str, facts: &str, 
     })
 }
 
-/// Bytes as a text, as the page's scripts read it.
-pub fn text_of(bytes: &[u8]) -> String {
+/// Bytes as a text, which `bytesOf` of the page's scripts reads.
+pub fn base64(bytes: &[u8]) -> String {
     BASE64.encode(bytes)
 }
 
@@ -148,7 +148,7 @@ pub(crate) fn write_block(
     block: &[u8],
 ) -> io::Result<()> {
     let attributes = format!(r#"data-sequence="{sequence}" data-first="{first}" data-count="{count}""#);
-    writeln!(out, r#"<script type="text/plain" class="block" {attributes}>{}</script>"#, text_of(block))
+    writeln!(out, r#"<script type="text/plain" class="block" {attributes}>{}</script>"#, base64(block))
 }
 
 /// Ends the page.

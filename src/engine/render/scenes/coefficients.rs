@@ -47,8 +47,8 @@ impl CoefficientScene {
         let later = later(request.frames, config);
         let mut fetched = self.fetched[channel];
         prefetch.gather(self.file.by_window(later), |frames, prefetch| {
-            // In other modes, which blocks are hidden is known later.
-            if config.mode.is_projection() {
+            // In other modes, which blocks are hidden is known later. Coarse ones share their bytes.
+            if self.knows_parts(config) {
                 let batch = CoefficientBatch::open(&self.file, self.what, &BatchRequest { frames, ..*request })?;
                 let mut blocks = batch.selection.blocks.clone();
                 self.file.blocks.sort_nested(&mut blocks);
@@ -57,11 +57,16 @@ impl CoefficientScene {
             fetched = frames[frames.len() - 1] + 1;
             Ok(())
         })?;
-        if config.mode.is_projection() {
+        if self.knows_parts(config) {
             prefetch.finish()?;
         }
         self.fetched[channel] = fetched;
         Ok(())
+    }
+
+    /// Whether all parts to fetch are known before the first block is drawn.
+    fn knows_parts(&self, config: &RenderConfig) -> bool {
+        config.mode.is_projection() || self.file.lod() > 0
     }
 
     /// Fetches the leaves of a remote file for some frames and later ones, and returns what fetches their parts. None if the parts of

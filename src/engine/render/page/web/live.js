@@ -31,11 +31,20 @@ function partsOf(bytes) {
   return { about: { ...about, opacity }, blocks: blocks.map(([frames, size]) => [frames, part(size)]), errors: errors && part(errors) };
 }
 
-// Pixels of a square picture at the places of those of another one with the same middle and so many pixels for one of it.
-function cut(planes, side, [width, height], scale) {
-  const place = count => Int32Array.from({ length: count }, (_, n) => clamped(Math.round((n + 0.5 - count / 2) * scale + side / 2 - 0.5), 0, side - 1));
-  const [across, down] = [place(width), place(height)];
+// Where the first pixel of a side lies along one of `others` pixels with the same middle, if pixels are `step` of those apart.
+const firstPlace = (count, others, step) => (0.5 - count / 2) * step + others / 2 - 0.5;
+
+// A square picture in another shape with the same middle, with pixels that are `step` of its own apart. What is beyond is as its edge.
+function cut(planes, side, [width, height], step) {
+  const places = count => Int32Array.from({ length: count }, (_, n) => clamped(Math.round(firstPlace(count, side, step) + n * step), 0, side - 1));
+  const [across, down] = [places(width), places(height)];
   return planes.map(plane => Float32Array.from({ length: width * height }, (_, n) => plane[down[Math.floor(n / width)] * side + across[n % width]]));
+}
+
+// The rays of a picture whose first pixel is `at` that of another one, with pixels that are `step` of those apart.
+function seenFrom(ray, at, step) {
+  const scaled = vector => vector.map(number => number * step);
+  return { ...ray, from: ray.from.map((place, axis) => place + at[0] * ray.right[axis] + at[1] * ray.down[axis]), right: scaled(ray.right), down: scaled(ray.down) };
 }
 
 // Numbers with nine digits: a picture of 4096 pixels shows no more.
@@ -68,10 +77,11 @@ class Live {
     this.wanted = 0; // how many requests of the user there were
     this.waiting = 0; // and how many of them wait
     this.isMoving = false;
-    this.embedded = facts.file?.first; // a picture of what is shown first
-    if (this.embedded) {
-      this.embedded.answer = partsOf(bytesOf(this.embedded.answer));
-      this.learnColours(`${this.firstMode} `, this.embedded.answer.about, FULL);
+    const { preview } = facts.file ?? {};
+    if (preview) {
+      preview.answer = partsOf(bytesOf(preview.answer));
+      this.describe(preview.answer.about);
+      this.learnColours(`${this.firstMode} `, preview.answer.about, FULL);
     }
   }
 
@@ -176,7 +186,8 @@ class Live {
     this.index = index;
     clearTimeout(this.filling);
     const wanted = ++this.wanted, qualities = this.qualities(isPlaying);
-    if (this.embedded) await this.takeEmbedded(index);
+    const preview = this.isMoving || isPlaying ? null : await this.preview(index).catch(problem);
+    if (preview && wanted === this.wanted) yield preview;
     const best = QUALITIES.findLast(quality => quality !== COARSE && this.found(quality, index));
     if (best) yield this.found(best, index);
     for (const quality of qualities.filter(quality => QUALITIES.indexOf(quality) > QUALITIES.indexOf(best))) {
@@ -190,18 +201,15 @@ class Live {
     else this.fillLater(index);
   }
 
-  // Takes the picture that the page has of what it shows first for a coarse one, if this is what is seen.
-  async takeEmbedded(index) {
-    const { answer: { about, blocks: [[, block]] }, scale } = this.embedded, { archive, ...state } = this.state;
-    this.embedded = null;
-    if (index !== this.opening || Object.values(state).some(value => (value ?? null) !== null)) return;
-    const { size } = this.measures(COARSE), [side] = about.size, { pictures: [planes] } = await readBlock(block), finer = scale / this.scaleIn(size);
-    this.describe(Object.assign(about, { size, mode: this.look.mode }));
-    const [ray] = about.rays, [x, y] = size.map(count => (0.5 - count / 2) * finer + side / 2 - 0.5);
-    const times = (vector, factor) => vector.map(number => number * factor);
-    const rays = ray && { ...ray, from: ray.from.map((at, a) => at + x * ray.right[a] + y * ray.down[a]), right: times(ray.right, finer), down: times(ray.down, finer) };
-    const picture = { planes: cut(planes, side, size, finer), about: { ...about, rays: [rays] }, backdrop: null, shares: rays && sharesOf(rays, size), quality: COARSE };
-    this.remembered(this.key(COARSE)).set(index, picture);
+  // The picture within the page of what it shows first, if this is what is seen, in the shape of a coarse one. It shows while the engine
+  // starts.
+  async preview(index) {
+    const { preview } = this.facts.file ?? {}, { archive, ...state } = this.state, isFirst = Object.values(state).every(value => (value ?? null) === null);
+    if (!preview || this.kept.size || index !== this.opening || !isFirst || this.look.map || this.look.range) return null;
+    const { about, blocks: [[, block]] } = preview.answer, { size } = this.measures(COARSE), step = preview.scale / this.scaleIn(size);
+    const { size: [side], pictures: [planes] } = await readBlock(block), [ray] = about.rays;
+    const shares = ray && sharesOf(seenFrom(ray, size.map(count => firstPlace(count, side, step)), step), size);
+    return { planes: cut(planes, side, size, step), about: { ...about, size, mode: this.firstMode }, backdrop: null, shares, quality: COARSE };
   }
 
   // Completes the description of pictures.
@@ -214,9 +222,13 @@ class Live {
 
   // Loads coarse pictures of the frames that a user who steps through time sees next, and of the one behind.
   async loadNext(index, step, wanted) {
-    const last = this.sequences[0].pictures.length - 1, [one, other] = [index - step, index + STEPS * step].map(frame => clamped(frame, 0, last));
+    const last = this.sequences[0].pictures.length - 1;
     await new Promise(next => setTimeout(next)); // the picture is drawn meanwhile
-    if (wanted === this.wanted && this.underWay?.rank !== PLOT) await this.loadMissing([Math.min(one, other), Math.max(one, other) + 1], COARSE).catch(problem);
+    for (const ends of [[index + step, index + STEPS * step], [index - step, index - step]]) {
+      if (wanted !== this.wanted || this.underWay?.rank === PLOT) return;
+      const [one, other] = ends.map(frame => clamped(frame, 0, last));
+      await this.loadMissing([Math.min(one, other), Math.max(one, other) + 1], COARSE).catch(problem);
+    }
   }
 
   // Does without sharp pictures from then on if the server lacks memory for one.
@@ -387,7 +399,6 @@ class Live {
   async loadMissing([first, end], quality) {
     const isThere = frame => this.found(quality, frame) || quality === COARSE && this.found(FULL, frame);
     const { wanted, engine: { together = end - first } } = this;
-    while (end > first && isThere(end - 1)) end -= 1;
     for (let frame = first; frame < end && wanted === this.wanted; frame++) {
       if (isThere(frame)) continue;
       const frames = [frame, Math.min(frame + together, end)];

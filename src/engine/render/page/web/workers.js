@@ -20,7 +20,9 @@ class Workers {
   // The program, and the file or where it is.
   async read({ name, length, request, url, program }) {
     const far = url && new URL(url, location.href).href, packed = program ? await fetched(program) : bytesOf(await textOfPart('program', 'file'));
-    const module = await WebAssembly.compile(await inflated(packed)), bytes = far ? null : bytesOf(await textOfPart('file'));
+    const module = await WebAssembly.compile(await inflated(packed)), text = far ? null : await textOfPart('file');
+    if (!far && text.length !== 4 * Math.ceil(length / 3)) throw incomplete(name);
+    const bytes = far ? null : bytesOf(text);
     element('file')?.remove(); // its text takes memory
     this.source ??= URL.createObjectURL(new Blob([await textOfPart('worker')], { type: 'text/javascript' }));
     return { source: this.source, module, file: { name, length, request, url: far, bytes } };
@@ -36,8 +38,12 @@ class Workers {
 // The text of a part of the page, as soon as the browser has read it: up to the next part, or all of the page.
 async function textOfPart(id, next) {
   while (document.readyState === 'loading' && !(next && element(next))) await pause(5);
-  return element(id).textContent;
+  const part = element(id);
+  if (!part) throw incomplete(`the ${id}`);
+  return part.textContent;
 }
+
+const incomplete = what => new Error(`${what} is incomplete: get this page again`);
 
 async function fetched(address) {
   const answer = await fetch(address).catch(() => null);
