@@ -85,7 +85,7 @@ class WavesplatBackend(BackendEntrypoint):
     ) -> xr.Dataset:
         """The dataset of a file or an address; with ``lod``, every 2**lod-th voxel along each axis."""
         file = open(_place(filename_or_obj), lod=lod, cache_dir=cache_dir)
-        variables, attrs = _variables(file)
+        variables, attrs = variables_of(file)
         dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
         variables = {name: var for name, var in variables.items() if name not in dropped}
         given: dict[str, Any] = {} if use_cftime is None else {"use_cftime": use_cftime}
@@ -127,7 +127,7 @@ def _place(of: Any) -> str:
     return place
 
 
-def _variables(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
+def variables_of(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
     """The variables that a file stands for, as its source encoded them, and global attributes."""
     described = file.description
     if described is None:
