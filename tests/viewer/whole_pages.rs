@@ -246,10 +246,12 @@ fn damaged_files_end_in_a_message() {
     browser.wait(FULL);
     let file = work.read("a.wspl");
     let page = String::from_utf8(work.read("a.html")).unwrap();
-    let cut = page.find("id=\"file\"").unwrap() + 100;
-    work.write("cut.html", &page[..cut]);
-    browser.open_file(&work.path("cut.html"));
-    browser.wait("element('readout').textContent.includes('a.wspl is incomplete')");
+    for (part, told) in [("program", "the program is incomplete"), ("file", "a.wspl is incomplete")] {
+        let cut = page.find(&format!("id=\"{part}\"")).unwrap() + 100;
+        work.write(&format!("{part}.html"), &page[..cut]);
+        browser.open_file(&work.path(&format!("{part}.html")));
+        browser.wait(&format!("element('readout').textContent.includes('{told}')"));
+    }
     browser.open_file(&work.path("a.html"));
     browser.wait(FULL);
     for n in 0..24 {

@@ -43,7 +43,8 @@ const SHARE: usize = 8;
 /// The same for the blocks above of one block, and at coarser levels of detail, where other blocks take little.
 const LARGER_SHARE: usize = 4;
 
-/// Blocks above of one block, and one more: with fewer, its neighbours decode the same ones again.
+/// A block has up to three tiers above it in files of usual size: a block of each, and one more. With fewer, neighbours decode the
+/// same ones again.
 pub(crate) const OF_ONE_BLOCK: usize = 4;
 
 impl AboveBlocks {

@@ -7,18 +7,19 @@ import dask.array as da
 import numpy as np
 import pytest
 import xarray as xr
-import zarr
-from conftest import run
+from conftest import run, smooth
 from test_xarray import ocean
-from zarr.abc.store import OffsetByteRequest, RangeByteRequest, SuffixByteRequest
-from zarr.core.buffer import default_buffer_prototype
-from zarr.storage import MemoryStore
 
 import wavesplat
-import wavesplat.zarr
-from wavesplat.zarr import CoefficientStore
 
-pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+zarr = pytest.importorskip("zarr")  # for Python 3.11 or later
+
+from zarr.abc.store import OffsetByteRequest, RangeByteRequest, SuffixByteRequest  # noqa: E402
+from zarr.core.buffer import default_buffer_prototype  # noqa: E402
+from zarr.storage import MemoryStore  # noqa: E402
+
+import wavesplat.zarr  # noqa: E402
+from wavesplat.zarr import CoefficientStore  # noqa: E402
 
 
 def test_samples_are_those_of_the_file(path, decoded):
@@ -51,6 +52,38 @@ def test_xarray_opens_the_same_dataset(tmp_path, dtype):
         xr.testing.assert_identical(found.load(), expected.load())
 
 
+@pytest.mark.filterwarnings("ignore:The data type")
+def test_all_that_stands_beside_the_samples(tmp_path):
+    samples = smooth((6, 5, 7, 8))
+    beside = {
+        "text": ("z", np.array(["a", "bc", "", "déf", "g"], object)),
+        "letters": (("z", "width"), np.array([list("ab")] * 5, "S1"), {"_FillValue": b" "}),
+        "one": ((), 3.5),
+        "yes": ("x", np.arange(8) % 2 == 0),
+        "kept": ("y", np.arange(7.0, dtype="f4"), {"_FillValue": np.float32(3)}),
+        "whole": ("y", np.arange(7, dtype="i4"), {"_FillValue": np.int32(-1)}),
+    }
+    ds = xr.Dataset({"v": (("t", "z", "y", "x"), samples)}).assign_coords(beside)
+    ds.attrs = {"_FillValue": 3.0, "list": [1.5, 2.5], "text": "a text"}
+    ds.to_netcdf(tmp_path / "a.nc")
+    run("convert", tmp_path / "a.nc", "-o", tmp_path / "a.wspl", "-q")
+    expected = xr.open_dataset(tmp_path / "a.wspl", engine="wavesplat").load()
+    found = xr.open_zarr(CoefficientStore(wavesplat.open(tmp_path / "a.wspl")), consolidated=False).load()
+    assert set(found.variables) == set(expected.variables)
+    for name in expected.variables:
+        np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=name)
+        assert found[name].dims == expected[name].dims
+    assert found.attrs["list"] == [1.5, 2.5]
+
+
+@pytest.mark.parametrize("name", ["a\\b", "zarr.json", "..", "c", "__x", "é t"])
+def test_any_name_of_samples_has_an_array(tmp_path, name):
+    array = xr.DataArray(smooth((4, 5, 6, 7)), dims=("t", "z", "y", "x"), name=name)
+    wavesplat.convert(array, tmp_path / "a.wspl")
+    ((_, samples),) = wavesplat.zarr.open(tmp_path / "a.wspl").arrays()
+    np.testing.assert_array_equal(samples[...], wavesplat.open(tmp_path / "a.wspl")[...])
+
+
 def test_colours_are_three_arrays(tmp_path, samples):
     np.save(tmp_path / "a.npy", samples[:4])
     run("convert", tmp_path / "a.npy", "-o", tmp_path / "a.wspl", "--transfer-function", "viridis", "-q")
@@ -71,7 +104,10 @@ def test_a_store_holds_what_it_lists(file, decoded):
             assert await store.exists(key)
             await copy.set(key, await store.get(key, prototype))
         assert sorted([key async for key in store.list_dir("")]) == ["data", "zarr.json"]
+        assert sorted([key async for key in store.list_dir("data")]) == ["c", "zarr.json"]
+        assert [key async for key in store.list_dir("data/c/")] == ["0", "1", "2"]
         assert [key async for key in store.list_dir("data/c/0/0/0/")] == ["0", "1"]
+        assert not [key for folder in ("data/c/3", "data/c/0/0/0/0", "data/d") async for key in store.list_dir(folder)]
         return found
 
     found = asyncio.run(keys())
@@ -91,7 +127,18 @@ def test_parts_of_chunks_and_keys_that_are_not_there(file):
     assert get("data/c/2/1/1/1", RangeByteRequest(100, 164)) == whole[100:164]
     assert get("data/c/2/1/1/1", OffsetByteRequest(1000)) == whole[1000:]
     assert get("data/c/2/1/1/1", SuffixByteRequest(8)) == whole[-8:]
-    for key in "data/c/3/0/0/0", "data/c/-1/0/0/0", "data/c/0/0/0", "data/c/0/0/0/a", "other/c/0", "data/c/", "c/0":
+    for key in (
+        "data/c/3/0/0/0",
+        "data/c/-1/0/0/0",
+        "data/c/01/0/0/0",
+        "data/c/+1/0/0/0",
+        "data/c/²/0/0/0",
+        "data/c/0/0/0",
+        "data/c/0/0/0/a",
+        "other/c/0",
+        "data/c/",
+        "c/0",
+    ):
         assert get(key) is None, key
         assert not asyncio.run(store.exists(key)), key
 
@@ -107,7 +154,15 @@ def test_nothing_is_written(file):
 def test_stores_travel_to_other_processes(file, decoded):
     store = pickle.loads(pickle.dumps(CoefficientStore(file)))
     assert store == CoefficientStore(file)
+    assert store != CoefficientStore(wavesplat.open(file.path, lod=1))
     np.testing.assert_array_equal(zarr.open_group(store, mode="r")["data"][7], decoded[7])
+
+
+def test_a_closed_store_is_a_closed_file(path):
+    group = wavesplat.zarr.open(path)
+    group.store.close()
+    with pytest.raises(ValueError, match="is closed"):
+        group["data"][0]
 
 
 def test_damage_is_named(tmp_path, path):

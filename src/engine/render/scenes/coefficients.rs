@@ -47,7 +47,7 @@ impl CoefficientScene {
         let later = later(request.frames, config);
         let mut fetched = self.fetched[channel];
         prefetch.gather(self.file.by_window(later), |frames, prefetch| {
-            // In other modes, which blocks are hidden is known later. Coarse ones share their bytes.
+            // In other modes, which blocks are hidden is known later. At coarse levels of detail, they share nearly all bytes.
             if self.knows_parts(config) {
                 let batch = CoefficientBatch::open(&self.file, self.what, &BatchRequest { frames, ..*request })?;
                 let mut blocks = batch.selection.blocks.clone();

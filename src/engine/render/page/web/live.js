@@ -31,7 +31,7 @@ function partsOf(bytes) {
   return { about: { ...about, opacity }, blocks: blocks.map(([frames, size]) => [frames, part(size)]), errors: errors && part(errors) };
 }
 
-// Where the first pixel of a side lies along one of `others` pixels with the same middle, if pixels are `step` of those apart.
+// The place of the first of `count` pixels, `step` apart, in a row of `others` pixels with the same middle.
 const firstPlace = (count, others, step) => (0.5 - count / 2) * step + others / 2 - 0.5;
 
 // A square picture in another shape with the same middle, with pixels that are `step` of its own apart. What is beyond is as its edge.
@@ -204,8 +204,10 @@ class Live {
   // The picture within the page of what it shows first, if this is what is seen, in the shape of a coarse one. It shows while the engine
   // starts.
   async preview(index) {
-    const { preview } = this.facts.file ?? {}, { archive, ...state } = this.state, isFirst = Object.values(state).every(value => (value ?? null) === null);
-    if (!preview || this.kept.size || index !== this.opening || !isFirst || this.look.map || this.look.range) return null;
+    const { preview } = this.facts.file ?? {};
+    if (!preview || this.kept.size || index !== this.opening || this.look.map || this.look.range) return null;
+    const { archive, ...state } = this.state;
+    if (Object.values(state).some(value => (value ?? null) !== null)) return null;
     const { about, blocks: [[, block]] } = preview.answer, { size } = this.measures(COARSE), step = preview.scale / this.scaleIn(size);
     const { size: [side], pictures: [planes] } = await readBlock(block), [ray] = about.rays;
     const shares = ray && sharesOf(seenFrom(ray, size.map(count => firstPlace(count, side, step)), step), size);
@@ -366,12 +368,13 @@ class Live {
       return [...parts].reduce((sum, part) => sum + (part?.byteLength ?? 0), 0);
     };
     let all = [...this.kept.values()].reduce((sum, pictures) => sum + bytes(pictures), 0);
+    const { keptBytes: most = KEPT_BYTES } = this.engine;
     for (const [oldest, pictures] of this.kept) {
-      if (all <= KEPT_BYTES || oldest === key) break;
+      if (all <= most || oldest === key) break;
       all -= bytes(pictures);
       this.kept.delete(oldest);
     }
-    if (all > KEPT_BYTES) kept.clear();
+    if (all > most) kept.clear();
     return kept;
   }
 
@@ -401,7 +404,8 @@ class Live {
     const { wanted, engine: { together = end - first } } = this;
     for (let frame = first; frame < end && wanted === this.wanted; frame++) {
       if (isThere(frame)) continue;
-      const frames = [frame, Math.min(frame + together, end)];
+      const frames = [frame, frame + 1];
+      while (frames[1] < Math.min(frame + together, end) && !isThere(frames[1])) frames[1] += 1;
       await this.load(this.key(quality), { frames, quality, index: frame, rank: AHEAD, isSpare: true });
       frame = frames[1] - 1;
     }
