@@ -8,7 +8,7 @@ class Workers {
   constructor(file) {
     this.blockTime = 300; // milliseconds that a block of full pictures may take: nothing stops it
     this.together = 1; // frames that are asked for together while nobody waits
-    this.keptBytes = 192 * 2 ** 20; // of pictures: with the workers, the page takes less than 1 GB
+    this.keptBytes = 128 * 2 ** 20; // of pictures: with the workers, the page takes less than 1 GB
     const hand = memory => new Hand(file.url ? GRACE_FAR : GRACE, async () => {
       this.ready ??= this.read(file);
       this.ready.catch(() => { this.ready = null; }); // the next question tries again
