@@ -249,7 +249,7 @@ fn damaged_files_end_in_a_message() {
     for (part, told) in [("program", "the program is incomplete"), ("file", "a.wspl is incomplete")] {
         let cut = page.find(&format!("id=\"{part}\"")).unwrap() + 100;
         work.write(&format!("{part}.html"), &page[..cut]);
-        browser.open_file(&work.path(&format!("{part}.html")));
+        browser.open_file(&work.path(format!("{part}.html")));
         browser.wait(&format!("element('readout').textContent.includes('{told}')"));
     }
     browser.open_file(&work.path("a.html"));
