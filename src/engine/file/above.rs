@@ -40,11 +40,11 @@ type Slot = Arc<Mutex<Option<Arc<Field<'static>>>>>;
 /// The decoded blocks take at most one part in so many of a memory budget.
 const SHARE: usize = 8;
 
-/// The same for the blocks above of one block, and at coarser levels of detail, where other blocks take little.
+/// A larger share for the blocks above a single block, and for coarser levels of detail, where other blocks take little.
 const LARGER_SHARE: usize = 4;
 
-/// A block has up to three tiers above it in files of usual size: a block of each, and one more. With fewer, neighbours decode the
-/// same ones again.
+/// Blocks above a single block: one of each tier, of which files of usual size have three, and one more. If fewer stay decoded,
+/// neighbours decode the same ones again.
 pub(crate) const OF_ONE_BLOCK: usize = 4;
 
 impl AboveBlocks {

@@ -76,6 +76,11 @@ def test_all_that_stands_beside_the_samples(tmp_path):
     assert found.attrs["list"] == [1.5, 2.5]
 
 
+@pytest.mark.parametrize("fill", [np.nan, np.inf, 0.5])
+def test_a_fill_value_that_no_integer_has_is_left_out(fill):
+    assert wavesplat.zarr._plain({"_FillValue": fill, "units": "m"}, np.dtype("i4")) == {"units": "m"}
+
+
 @pytest.mark.parametrize("name", ["a\\b", "zarr.json", "..", "c", "__x", "é t"])
 def test_any_name_of_samples_has_an_array(tmp_path, name):
     array = xr.DataArray(smooth((4, 5, 6, 7)), dims=("t", "z", "y", "x"), name=name)

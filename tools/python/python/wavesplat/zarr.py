@@ -217,6 +217,6 @@ def _plain(attributes: dict[str, Any], dtype: np.dtype[Any] | None = None) -> di
         return plain
     if dtype.kind == "f":
         plain["_FillValue"] = base64.standard_b64encode(struct.pack("<d", fill)).decode()
-    elif dtype.kind in "iu" and fill == int(fill):
+    elif dtype.kind in "iu" and float(fill).is_integer():
         plain["_FillValue"] = int(fill)
     return plain

@@ -34,7 +34,7 @@ function partsOf(bytes) {
 // The place of the first of `count` pixels, `step` apart, in a row of `others` pixels with the same middle.
 const firstPlace = (count, others, step) => (0.5 - count / 2) * step + others / 2 - 0.5;
 
-// A square picture in another shape with the same middle, with pixels that are `step` of its own apart. What is beyond is as its edge.
+// A square picture in another shape with the same middle, with pixels that are `step` of its own apart. Pixels beyond it repeat its edge.
 function cut(planes, side, [width, height], step) {
   const places = count => Int32Array.from({ length: count }, (_, n) => clamped(Math.round(firstPlace(count, side, step) + n * step), 0, side - 1));
   const [across, down] = [places(width), places(height)];
