@@ -20,6 +20,11 @@ impl<'a> FieldReader<'a> {
         self.0.len()
     }
 
+    /// What is not read yet.
+    pub(crate) fn rest(self) -> &'a [u8] {
+        self.0
+    }
+
     pub(crate) fn array<const N: usize>(&mut self) -> ParseResult<[u8; N]> {
         let Some((head, tail)) = self.0.split_first_chunk::<N>() else {
             return Err(format!("ends {} bytes early", N - self.0.len()));

@@ -42,8 +42,10 @@ mod tests;
 mod prefix;
 mod window;
 mod writer;
+mod bare;
 
 pub use arithmetic::{BitDecoder, BitEncoder, Chance};
+pub use bare::{from_bare, to_bare};
 pub use block::{BlockId, BlockStats, Compressor, EncodedBlock, EncodedPart, PartKind, PartStats};
 pub use codes::max_packed;
 pub use codes::sparse::{CodeBox, DenseCodes, Places, SparseCodes};

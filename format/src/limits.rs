@@ -48,6 +48,9 @@ pub const MAX_DESCRIPTION_ITEMS: usize = 1 << 16;
 /// Bytes of the root of the directory before compression: 8 million leaves.
 pub const MAX_ROOT_RAW: u64 = 1 << 30;
 
+/// Bytes of the head of a bare stream before compression: metadata, and thousands of blocks. Larger archives are files.
+pub const MAX_BARE_HEAD: usize = 32 << 20;
+
 /// Channels of an archive.
 pub const MAX_CHANNELS: u16 = 256;
 

@@ -5,7 +5,7 @@ use crate::footer::{FOOTER, Footer};
 use crate::header::Features;
 use crate::section::{SectionExtent, SectionId, compress_directory, frame};
 use crate::testing::{ID, blocks, metadata, read_all};
-use crate::{CompletePrefix, Error, Metadata, Reader, Recovery, Writer};
+use crate::{CompletePrefix, Error, Metadata, Reader, Recovery, Writer, to_bare};
 
 fn description() -> Description {
     let text = |name: &str, text: &str| Attribute { name: name.into(), value: Values::text(text) };
@@ -36,6 +36,8 @@ fn a_description_comes_back_and_changes_nothing_else() {
     assert_eq!((read(&plain), read(&described)), (None, Some(description())));
     assert_eq!(read_all(&plain).expect("whole"), read_all(&described).expect("whole"));
     assert_eq!((described[10], described[16] & 2), (1, 2));
+    let bare = to_bare(&Reader::open(&described).expect("whole")).expect_err("a description");
+    assert!(bare.to_string().contains("no description"), "{bare}");
 }
 
 #[test]

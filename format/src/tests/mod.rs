@@ -1,5 +1,6 @@
 //! Tests of whole files.
 
+mod bare;
 mod described;
 mod exit;
 mod files;

@@ -120,6 +120,22 @@ fn leaf_entries_are_as_specified() {
 }
 
 #[test]
+fn the_start_of_a_bare_stream_is_as_specified() {
+    let mut metadata = metadata();
+    let blocks = blocks(&mut metadata, 1);
+    let stream = to_bare(&Reader::open(file(&metadata, &blocks)).expect("whole")).expect("few blocks");
+    let magic = [0x89, 0x57, 0x53, 0x42, 0x0D, 0x0A, 0x1A, 0x0A];
+    let stored = u32::from_le_bytes(stream[8..12].try_into().expect("four"));
+    let packed = &stream[24..24 + stored as usize];
+    let head = zstd::bulk::decompress(packed, 1 << 16).expect("one frame");
+    let (raw, sum) = ((head.len() as u32).to_le_bytes(), xxh3_64(packed).to_le_bytes());
+    #[rustfmt::skip]
+    check("Start of a bare stream", &stream[..24], &[
+        ("magic", &magic), ("stored", &stored.to_le_bytes()), ("raw", &raw), ("checksum", &sum),
+    ]);
+}
+
+#[test]
 fn limits_are_as_specified() {
     use limits::*;
     #[rustfmt::skip]
@@ -130,7 +146,7 @@ fn limits_are_as_specified() {
         ("MAX_WINDOW_FRAMES", MAX_WINDOW_FRAMES.into()), ("MAX_COEFFICIENTS", MAX_COEFFICIENTS.into()),
         ("MAX_DIM", MAX_DIM), ("MAX_CHANNELS", MAX_CHANNELS.into()), ("MAX_TIERS", MAX_TIERS.into()), ("MAX_FRAMES", MAX_FRAMES), ("MAX_METADATA", MAX_METADATA as u64),
         ("MAX_ROOT_RAW", MAX_ROOT_RAW), ("MAX_DESCRIPTION", MAX_DESCRIPTION as u64),
-        ("MAX_DESCRIPTION_ITEMS", MAX_DESCRIPTION_ITEMS as u64),
+        ("MAX_DESCRIPTION_ITEMS", MAX_DESCRIPTION_ITEMS as u64), ("MAX_BARE_HEAD", MAX_BARE_HEAD as u64),
     ];
     let stated: Vec<_> = table("9. Limits").iter().map(|row| (row[0], row[1].parse().expect("number"))).collect();
     assert_eq!(stated, limits);

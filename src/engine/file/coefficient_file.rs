@@ -22,7 +22,7 @@ use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::coarse;
 use wavesplat_core::codec::decode::Block;
 use wavesplat_core::source::{CHANNELS, ColourTransform};
-use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage, Window};
+use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage, Window, from_bare};
 
 /// An open coefficient file; several threads may read it. Clones share what is open.
 #[derive(Debug, Clone)]
@@ -87,6 +87,18 @@ impl CoefficientFile {
     /// As [`Self::open`].
     pub fn from_storage(name: impl Into<PathBuf>, storage: impl Storage + Send + Sync + 'static) -> Result<Self> {
         Self::from_kept(name.into(), remote::kept(Box::new(storage)))
+    }
+
+    /// Opens the [bare stream](wavesplat_format::from_bare) at the start of `bytes` as a file in memory. Returns the bytes after
+    /// it, too.
+    ///
+    /// # Errors
+    /// The stream is damaged, or none.
+    pub fn from_bare(name: impl Into<PathBuf>, bytes: &[u8]) -> Result<(Self, &[u8])> {
+        let name = name.into();
+        let made = from_bare(bytes).map_err(|source| Error::CoefficientFile { path: name.clone(), source });
+        let (file, rest) = made?;
+        Ok((Self::from_storage(name, file)?, rest))
     }
 
     /// Opens a file in a storage that keeps what was read, if it is remote.

@@ -4,6 +4,7 @@
 //! from Python, and releases the interpreter's lock meanwhile.
 
 mod advice;
+mod chunk;
 mod convert;
 mod described;
 mod errors;
@@ -18,6 +19,8 @@ use pyo3::prelude::*;
 
 #[pymodule]
 mod _wavesplat {
+    #[pymodule_export]
+    use super::chunk::{decode, encode};
     #[pymodule_export]
     use super::convert::{convert_arrays, convert_frames, merge};
     #[pymodule_export]

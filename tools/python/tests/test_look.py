@@ -131,8 +131,11 @@ def test_napari_gets_a_dask_array(path, decoded):
 
     ((samples, settings, kind),) = get_reader([str(path)])([str(path)])
     assert kind == "image"
-    assert samples.chunks == wavesplat.open(path).chunks
-    np.testing.assert_array_equal(samples.compute(), decoded)
+    assert len(samples) == wavesplat.open(path).coarsest + 1
+    assert samples[0].chunks == wavesplat.open(path).chunks
+    for lod, level in enumerate(samples):
+        np.testing.assert_array_equal(level.compute(), decoded[:, :: 2**lod, :: 2**lod, :: 2**lod])
+    assert settings["multiscale"] == (len(samples) > 1)
     assert len(settings["scale"]) == 4
     assert get_reader("a.png") is None
 

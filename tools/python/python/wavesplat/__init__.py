@@ -15,7 +15,8 @@ import sys as _sys
 
 from ._convert import convert, merge
 from ._figure import Figure
-from ._file import File, Viewer, open
+from ._file import File, open
+from ._viewer import Viewer
 from ._wavesplat import (
     BoundMissedError,
     ChangedError,

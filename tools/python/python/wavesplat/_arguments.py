@@ -8,6 +8,9 @@ from collections.abc import Iterable
 from numbers import Number
 from typing import Any
 
+MEMORY = 512 << 20
+"""Bytes that reading, converting and rendering may take beside their results."""
+
 
 def number(name: str, given: Any) -> float:
     """A number."""

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from . import _wavesplat
-from ._arguments import located, number, pair, text, three, whole
-from ._file import MEMORY
+from ._arguments import MEMORY, located, number, pair, text, three, whole
 from ._frames import Frames
 from ._progress import Progress, reporting
 from ._times import Times
@@ -104,16 +103,11 @@ def convert(
         InputError: Samples are missing, or frames differ in shape or type.
 
     """
-    request: dict[str, Any] = {
-        "bound": _bound(bound, floor),
-        "range": None if range is None else [_finite("range", end) for end in pair("range", "(LO, HI)", range)],
-        **_missing(missing),
-        "keep": text("keep", keep),
+    request = settings_of(bound, floor, range, missing, keep, level) | {
         "best_for": _best_for(best_for),
         "window": None if window is None else whole("window", window),
         "chain": whole("chain", chain),
         "block": None if block is None else whole("block", block),
-        "level": whole("level", level),
         "memory": whole("memory", memory),
     }
     variable, axes = text("variable", variable), text("axes", axes)
@@ -176,6 +170,24 @@ def merge(
         names = [located(shard) for shard in shards]
         found: dict[str, Any] = json.loads(_wavesplat.merge(names, located(path), resume, overwrite, report))
     return found
+
+
+def settings_of(
+    bound: str,
+    floor: float,
+    range: tuple[float, float] | None,
+    missing: str | float | None,
+    keep: str,
+    level: int,
+) -> dict[str, Any]:
+    """Those fields of the library's ``ConvertRequest`` that conversions of whole archives and of chunks share."""
+    return {
+        "bound": _bound(bound, floor),
+        "range": None if range is None else [_finite("range", end) for end in pair("range", "(LO, HI)", range)],
+        **_missing(missing),
+        "keep": text("keep", keep),
+        "level": whole("level", level),
+    }
 
 
 @dataclass(frozen=True)

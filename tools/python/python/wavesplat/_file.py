@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -15,15 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _wavesplat
-from ._arguments import located, whole
+from ._arguments import MEMORY, located, whole
 from ._description import Axes, coordinates
 from ._figure import Figure
 from ._index import read_into, select
 from ._options import request
+from ._pictures import pictures
 from ._progress import Progress, reporting
-
-MEMORY = 512 << 20
-"""Bytes that reading, converting and rendering may take beside their results."""
+from ._viewer import Viewer
 
 CACHE = 512 << 20
 """Bytes of decoded blocks that an open file keeps."""
@@ -206,6 +205,23 @@ class File:
     def attrs(self) -> dict[str, Any]:
         """The attributes of the samples in the source."""
         return self._axes.attributes
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """The distance of voxels along x, y and z."""
+        x, y, z = self._file.spacing
+        return x, y, z
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """The place of the first voxel along x, y and z."""
+        x, y, z = self._file.origin
+        return x, y, z
+
+    @property
+    def coarsest(self) -> int:
+        """The coarsest level of detail that `wavesplat.open` takes."""
+        return self._file.coarsest
 
     @cached_property
     def times(self) -> npt.NDArray[np.float64]:
@@ -425,24 +441,19 @@ class File:
             raise ValueError(f"port: takes 0 to 65535, not {port}")
         return Viewer(self._file.view(request(options), port, str(memory)), browser=browser)
 
+    def to_pyvista(self, frame: int = 0, z: Any = slice(None), y: Any = slice(None), x: Any = slice(None)) -> Any:
+        """A frame, or a box of it, as a data set of PyVista: an ImageData, or a RectilinearGrid where distances differ.
 
-def pictures(options: dict[str, Any], make: Callable[[str], object]) -> npt.NDArray[Any]:
-    """The arrays that ``make`` writes to a file, or to one for each view; several views add an axis."""
-    is_several = isinstance(options.get("view"), list) or options.get("orbit", 1) != 1
-    is_several = is_several and not (options.get("over_time") or options.get("key_frames"))
-    with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
-        make(os.path.join(folder, "%05v.npy" if is_several else "pictures.npy"))
-        views = [np.load(path) for path in sorted(Path(folder).glob("*.npy"))]
-    together: npt.NDArray[Any] = np.stack(views) if is_several else views[0]
-    return together
+        Args:
+            frame: Which frame.
+            z: Which voxels along z, as a slice without a step.
+            y: Which voxels along y.
+            x: Which voxels along x.
 
+        """
+        from ._vtk import to_pyvista
 
-def run(options: dict[str, Any], output: str, inputs: Sequence[str], progress: Progress = False) -> None:
-    """Does what options of ``wavesplat-render`` ask for; errors have the names of Python."""
-    options = dict(options)
-    memory = str(options.pop("memory", MEMORY))
-    with reporting(progress, "render") as report:
-        _wavesplat.render(inputs, request(options), output, memory, report)
+        return to_pyvista(self, frame, (z, y, x))
 
 
 class Outer:
@@ -455,37 +466,6 @@ class Outer:
     def __getitem__(self, key: Any) -> Any:  # noqa: D105
         selection = select(key, self._of.shape, outer=True)
         return selection.finish(self._of._read(selection.items))
-
-
-class Viewer:
-    """The viewer of a file, a server on this machine. It answers until it is closed, or this object is gone."""
-
-    def __init__(self, viewer: _wavesplat.Viewer, *, browser: bool) -> None:
-        """Of a server that answers."""
-        self._viewer = viewer
-        if browser:
-            self._viewer.open_browser()
-
-    @property
-    def address(self) -> str:
-        """The address of the page. It holds a token: only who knows it can look."""
-        return self._viewer.address
-
-    def close(self) -> None:
-        """Ends the server."""
-        self._viewer.close()
-
-    def __enter__(self) -> Viewer:  # noqa: D105
-        return self
-
-    def __exit__(self, *raised: object) -> None:  # noqa: D105
-        self.close()
-
-    def __repr__(self) -> str:  # noqa: D105
-        return f"<wavesplat.Viewer {self.address}>"
-
-    def _repr_html_(self) -> str:
-        return f'<a href="{self.address}" target="_blank">{self.address}</a>'
 
 
 def anywhere(path: str) -> str:

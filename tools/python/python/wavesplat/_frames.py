@@ -53,7 +53,7 @@ class Frames:
             raise ValueError(f"source: takes an array (time, z, y, x) or (time, y, x), not one of shape {shape}")
         frames, *voxels = shape
         dtype = _dtype(array)
-        sample = _sample(dtype)
+        sample = sample_of(dtype)
         together = frames_together(shape, dtype.itemsize, _chunk(array), memory)
         each = ((start, array[start : start + together]) for start in range(0, frames, together))
         parts = (_Part(start, part, missing).bytes((*shape[1:],), dtype) for start, part in each)
@@ -69,7 +69,7 @@ class Frames:
         if like.ndim not in (2, 3) or 0 in like.shape:
             raise ValueError(f"source: frames are arrays (z, y, x) or (y, x), not of shape {like.shape}")
         each = enumerate(chain([first], iterator))
-        sample = _sample(like.dtype)
+        sample = sample_of(like.dtype)
         parts = (_Part(n, _array(frame)[None], missing).bytes(like.shape, like.dtype) for n, frame in each)
         return cls(_three(list(like.shape)), "source, the frames", sample, parts)
 
@@ -94,7 +94,8 @@ def _key(dtype: np.dtype[Any]) -> str:
     return f"{dtype.kind}{dtype.itemsize}"
 
 
-def _sample(dtype: np.dtype[Any]) -> str:
+def sample_of(dtype: np.dtype[Any]) -> str:
+    """The library's name of a type of samples."""
     known = SAMPLES.get(_NARROWED.get(_key(dtype), _key(dtype)))
     if known is None:
         raise ValueError(f"source: samples of type {dtype} are not supported; convert them by astype('float32')")
@@ -165,6 +166,11 @@ class _Part:
             return narrowed
         what = f"frame {self.start + _first(unfit)} has {array[unfit][0]}, which does not fit into {narrowed.dtype}"
         raise _wavesplat.InputError(f"source: {what}; convert the samples by astype('float64')")
+
+
+def bytes_of(frames: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    """The bytes of an array of frames, x fastest, as the type that files hold."""
+    return _Part(0, frames, None).bytes(frames.shape[1:], frames.dtype)
 
 
 def _first(found: npt.NDArray[np.bool_]) -> int:

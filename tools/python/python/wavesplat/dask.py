@@ -19,8 +19,9 @@ import xarray as xr
 
 from ._convert import convert as _convert
 from ._convert import merge
-from ._file import anywhere, pictures, run
+from ._file import anywhere
 from ._file import open as _open
+from ._pictures import pictures, run
 
 CHAIN = 256
 """Frames of a chain by default: 8 windows of 32 frames."""

@@ -1,4 +1,4 @@
-"""A reader for napari: a Dask array with scale, place and units."""
+"""A reader for napari: Dask arrays of all levels of detail, with scale, place and units."""
 
 from __future__ import annotations
 
@@ -25,10 +25,14 @@ def _layer(path: str) -> Layer:
     from ._file import open
 
     file = open(path)
-    samples = da.from_array(file, chunks=file.chunks, name=f"wavesplat-{file.id}", asarray=False)  # type: ignore[no-untyped-call]
+    levels = [file, *(open(path, lod=lod) for lod in range(1, file.coarsest + 1))]
+    samples = [
+        da.from_array(level, chunks=level.chunks, name=f"wavesplat-{file.id}-{level.lod}", asarray=False)  # type: ignore[no-untyped-call]
+        for level in levels
+    ]
     times = file.times
     step = float(times[1] - times[0]) if len(times) > 1 and times[1] > times[0] else 1.0
-    spacing, origin = file._file.spacing[::-1], file._file.origin[::-1]
+    spacing, origin = file.spacing[::-1], file.origin[::-1]
     settings: dict[str, Any] = {
         "name": file.variable or "samples",
         "scale": (step, *spacing),
@@ -37,4 +41,5 @@ def _layer(path: str) -> Layer:
         "axis_labels": file.dims,
         "metadata": {"path": file.path, "unit": file.unit, "time_unit": file.time_unit},
     }
-    return samples, settings, "image"
+    is_one = len(levels) == 1
+    return samples[0] if is_one else samples, settings | {"multiscale": not is_one}, "image"

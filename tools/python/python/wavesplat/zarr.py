@@ -1,4 +1,4 @@
-"""Coefficient files as read-only Zarr groups: ``wavesplat.zarr.open("run.wspl")``."""
+"""Coefficient files as read-only Zarr groups, ``wavesplat.zarr.open("run.wspl")``; and a codec of Zarr arrays."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ from zarr.abc.store import ByteRequest, OffsetByteRequest, RangeByteRequest, Sto
 from zarr.core.buffer import Buffer, BufferPrototype
 from zarr.storage import MemoryStore
 
+from ._codec import WavesplatCodec
 from ._file import File
 from ._file import open as open_file
 from .xarray import variables_of
+
+__all__ = ["CoefficientStore", "WavesplatCodec", "open"]
 
 
 def open(path: str | PathLike[str], **options: Any) -> zarr.Group:

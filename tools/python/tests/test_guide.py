@@ -1,0 +1,61 @@
+"""The code on the guide's page about other programs runs."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import smooth
+
+import wavesplat
+import wavesplat.xarray
+
+PAGE = Path(__file__).parents[2] / "guide/pipelines.md"
+
+
+def blocks(heading):
+    """The blocks of code below a heading of the page."""
+    sections = PAGE.read_text().split("\n## ")
+    (section,) = [text for text in sections if text.startswith(heading)]
+    assert len(section.split()) <= 300
+    return [part.split("```")[0] for part in section.split("```python\n")[1:]]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with a file."""
+    monkeypatch.chdir(tmp_path)
+    wavesplat.convert(smooth(), "run.wspl", tolerance=1e-3, block=8, times=np.arange(40) * 4.0)
+    return tmp_path
+
+
+def test_zarr(folder):
+    pytest.importorskip("zarr")
+    data = smooth((40, 16, 64, 64))
+    ds = xr.Dataset({"thetao": (("time", "depth", "lat", "lon"), data)}, {"time": np.arange(40)})
+    names = {"ds": ds}
+    for heading in ("Zarr arrays", "Files as Zarr"):
+        for block in blocks(heading):
+            exec(block, names)
+    assert 0 < np.abs(names["back"].thetao.values - data).max() <= 0.05
+    assert names["group"]["data"].shape == wavesplat.open("run.wspl").shape
+
+
+def test_pyvista(folder):
+    pyvista = pytest.importorskip("pyvista")
+    pyvista.OFF_SCREEN = True
+    exec(blocks("ParaView")[1].replace(".plot()", ""), {})
+    assert pyvista.read("part.vti").dimensions == (22, 18, 8)
+
+
+def test_paraview(folder):
+    program = shutil.which("pvpython")
+    if not program:
+        pytest.skip("needs pvpython")
+    site = str(Path(wavesplat.__path__[0]).parent)
+    begin = f"import inspect, sys; inspect.getargspec = inspect.getfullargspec; sys.path.append({site!r})\n"
+    (folder / "script.py").write_text(begin + blocks("ParaView")[0] + "print(reader.PointData[0].Name)\n")
+    done = subprocess.run([program, "script.py"], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["samples"]
