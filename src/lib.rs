@@ -177,7 +177,8 @@ pub use wavesplat_jobs::{axes, extract, picture};
 pub mod base {
     #[doc(inline)]
     pub use wavesplat_core::base::{
-        address, cancel, choice, description, error, grid, inputs, mapped, position, progress, sample, values, workers,
+        address, cancel, choice, description, error, grid, inputs, mapped, memory, position, progress, sample, values,
+        workers,
     };
 }
 

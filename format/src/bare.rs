@@ -1,10 +1,10 @@
-//! A bare stream: a file without all that follows from the rest (FORMAT.md section 12). Small archives, such as chunks of an
+//! A bare stream: a file without all that follows from the rest (FORMAT.md section 13). Small archives, such as chunks of an
 //! array, take less room as bare streams.
 
 use crate::block::{EncodedBlock, EncodedPart};
 use crate::bytes::{FieldReader, FieldWriter, ParseResult, ensure};
 use crate::directory::{BlockEntry, PartEntry};
-use crate::header::{HEADER, Header};
+use crate::header::{Features, HEADER, Header};
 use crate::leaf::leaves_of;
 use crate::limits::MAX_BARE_HEAD;
 use crate::section::{SectionId, compress_directory, decompress};
@@ -62,19 +62,9 @@ pub fn from_bare(bytes: &[u8]) -> Result<(Vec<u8>, &[u8])> {
     let header = Header::decode(header)?;
     let mut stream = Stream { id: header.id, entries: FieldReader::new(after), parts: rest };
     let metadata = stream.metadata().map_err(corrupt)?;
-    let start = metadata.start();
-    let mut file = Writer::with_features(Vec::new(), header.id, &start, header.features())?;
-    for number in 0..metadata.windows.len() as u32 {
-        file.begin_window(metadata.window_record(number))?;
-        for (first, count) in leaves_of(&metadata, number, metadata.tiers(number)) {
-            for block in (first.block..).take(count as usize) {
-                file.append(&stream.block(BlockId { block, ..first }).map_err(corrupt)?)?;
-            }
-        }
-        file.end_window(&metadata.window_end(number))?;
-    }
+    let file = stream.file(&metadata, header.features()).map_err(invalid)?;
     stream.entries.end().map_err(corrupt)?;
-    Ok((file.finish()?.0, stream.parts))
+    Ok((file, stream.parts))
 }
 
 /// The head, decompressed, and the bytes after it.
@@ -108,6 +98,21 @@ impl Stream<'_, '_> {
         Metadata::parse(self.entries.take(len)?)
     }
 
+    /// The file of these windows, written anew.
+    fn file(&mut self, metadata: &Metadata, features: Features) -> Result<Vec<u8>> {
+        let mut file = Writer::with_features(Vec::new(), self.id, &metadata.start(), features)?;
+        for number in 0..metadata.windows.len() as u32 {
+            file.begin_window(metadata.window_record(number))?;
+            for (first, count) in leaves_of(metadata, number, metadata.tiers(number)) {
+                for block in (first.block..).take(count as usize) {
+                    file.append(&self.block(BlockId { block, ..first }).map_err(corrupt)?)?;
+                }
+            }
+            file.end_window(&metadata.window_end(number))?;
+        }
+        Ok(file.finish()?.0)
+    }
+
     /// The next block, which must be this one.
     fn block(&mut self, id: BlockId) -> ParseResult<EncodedBlock> {
         let entry = BlockEntry::decode(&mut self.entries)?;
@@ -131,4 +136,13 @@ impl Stream<'_, '_> {
 /// An error in the stream's head, or in what it describes.
 fn corrupt(what: impl Into<String>) -> Error {
     Error::Corrupt { offset: 0, place: "bare stream".into(), what: what.into() }
+}
+
+/// The error of a stream that a writer refuses.
+fn invalid(error: Error) -> Error {
+    match error {
+        Error::Invalid(what) => corrupt(what),
+        Error::TooLarge { .. } => corrupt(error.to_string()),
+        other => other,
+    }
 }

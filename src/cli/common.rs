@@ -10,6 +10,7 @@ use std::fmt::Arguments;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::memory::for_reading;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_formats::extension_of_frames;
 use wavesplat_jobs::picture::Reporter;
@@ -56,7 +57,7 @@ impl CommonArgs {
 
     /// Bytes of the memory budget that a stream may take for the frames of one window.
     pub fn stream_memory(&self) -> usize {
-        self.memory.0 / 4
+        for_reading(self.memory.0)
     }
 
     /// Progress of a stage that counts `unit`s.

@@ -12,9 +12,10 @@ use std::process::Command;
 use std::thread;
 
 /// How commands begin that this test leaves out, and why.
-const NOT_RUN: [(&str, &str); 4] = [
+const NOT_RUN: [(&str, &str); 5] = [
     ("wavesplat view ", "it runs until it is interrupted; tests/viewer runs it"),
     ("cargo ", "a build takes minutes; tools/tests run the tools"),
+    ("cc ", "tools/c/tests compiles the examples"),
     ("target/release/wavesplat-tools ", "tools/tests run the tools"),
     ("python3 tools/peers/", "needs the packages of tools/peers/requirements.txt"),
 ];

@@ -227,6 +227,9 @@ fn changes(corpus: &mut Corpus) {
             corpus.push((target, format!("{name}-twice"), [&[seed][..], &edit, &[4, 0, 16, 0, 5, 4]].concat()));
             corpus.push((target, format!("{name}-whole"), vec![seed]));
         }
+        corpus.push(("bare", name.clone(), vec![seed]));
+        corpus.push(("bare", format!("{name}-changed"), vec![seed, 200 + seed, 0, seed + 1]));
+        corpus.push(("bare", format!("{name}-twice"), vec![seed, 44 + 7 * seed, 1, 255, 90, 2, 1]));
         corpus.push(("prefix", name.clone(), vec![seed, 0xFF, 0xFF]));
         corpus.push(("prefix", format!("{name}-cut"), [&[seed, 20, 0][..], &edit].concat()));
         for how in 0..5 {

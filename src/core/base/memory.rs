@@ -3,6 +3,11 @@
 /// The default budget, in bytes.
 pub const DEFAULT: usize = 512 << 20;
 
+/// Bytes of a budget for whoever reads frames that are not stored as they are: [`OpenOptions::memory`](crate::source::OpenOptions).
+pub fn for_reading(budget: usize) -> usize {
+    budget / 4
+}
+
 /// Bytes of a budget that are reserved for the program, stacks and directories.
 pub const FIXED: usize = 8 << 20;
 

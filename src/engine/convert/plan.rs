@@ -337,6 +337,26 @@ const MIB: f64 = 1_048_576.0;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wavesplat_core::base::grid::Grid;
+    use wavesplat_core::base::sample::SampleType;
+    use wavesplat_core::source::Archive;
+
+    /// Neither pipes nor packed files need a setting of memory, whatever their samples are.
+    #[test]
+    fn frames_of_any_samples_fit_the_usual_memory() {
+        let pipe = memory::for_reading(memory::DEFAULT) / 4;
+        for (memory, keep) in [(pipe, ""), (pipe, "range sign"), (2 * pipe, "")] {
+            for sample in SampleType::ALL {
+                for dims in [[48; 3], [50, 50, 50], [300, 200, 100], [512, 512, 4], [4096, 1, 1]] {
+                    let archive = Archive { memory, ..Archive::new(Grid::unit(dims), sample, None) };
+                    let keep = Keep::parse(keep).expect("words");
+                    let input = CodedInput::new(&ConvertConfig { keep, ..ConvertConfig::new(0.01) }, &archive);
+                    let error = Plan::new(&input).err();
+                    assert!(error.is_none(), "{dims:?} {sample}: {error:?}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn blocks_are_cubes_unless_the_volume_is_thin() {

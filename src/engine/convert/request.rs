@@ -117,6 +117,7 @@ impl ConvertRequest {
             check_max_error(self.bound, has_range, self.transfer_function.is_some())?;
         }
         let (setting, what) = match (&self.scan, self.shard) {
+            _ if !(1..=19).contains(&self.level) => ("level", "takes 1 to 19"),
             _ if self.lacks_prediction() => ("space", "none takes `basis` haar, multi or learned"),
             _ if self.range.is_some_and(|(lo, hi)| lo > hi) => ("range", "give the lower end first"),
             (Some(_), _) if has_range || is_exact => {
@@ -280,6 +281,7 @@ mod tests {
             (r#"{"tolerance": 0.1, "max_error": 0.1}"#, "tolerance", "give one"),
             (r#"{"range": [0, 1], "max_error": 0.1}"#, "range", "give one"),
             (r#"{"range": [1, 0]}"#, "range", "lower end first"),
+            (r#"{"level": 20}"#, "level", "1 to 19"),
             (r#"{"scan": "a.json", "range": [0, 1]}"#, "scan", "leave `range`"),
             (r#"{"scan": "a.json", "bound": {"relative": {"floor": 0}}}"#, "scan", "needs `bound`"),
             (r#"{"shard": "1/2", "bound": {"relative": {"floor": 0}}}"#, "shard", "needs `bound`"),

@@ -134,6 +134,34 @@ pub fn render(data: &[u8]) {
     });
 }
 
+/// The bare stream of a valid file with changes in its head: without changes it gives the same file.
+pub fn bare(data: &[u8]) {
+    let mut input = Input::new(data);
+    let (sound, _) = seed(input.byte());
+    let Ok(stream) = to_bare(&Reader::open(sound).expect("a sound file")) else { return }; // it has a description
+    let number = |at: usize| u32::from_le_bytes(stream[at..at + 4].try_into().expect("four bytes"));
+    let (stored, parts) = stream[BARE_START..].split_at(number(8) as usize);
+    let kind = PartKind::Missing; // of no account: a part and a head are compressed alike
+    let stats = PartStats { count: 1, energy: 0.0, largest: 0.0 };
+    let head = EncodedPart { kind, stats, raw_len: number(12), stored: stored.to_vec() };
+    let mut head = head.payload().expect("a head");
+    let is_changed = !input.is_empty();
+    while !input.is_empty() {
+        let at = input.short() % head.len();
+        head[at] = input.byte();
+    }
+    let head = Compressor::new(1).and_then(|mut zstd| zstd.part(kind, stats, &head)).expect("memory");
+    let lengths = [head.stored.len() as u32, head.raw_len].map(u32::to_le_bytes);
+    let checksum = xxhash_rust::xxh3::xxh3_64(&head.stored).to_le_bytes();
+    let forged = [&stream[..8], lengths.as_flattened(), &checksum, &head.stored, parts].concat();
+    let Ok((file, rest)) = from_bare(&forged) else { return assert!(is_changed, "it was sound") };
+    let read = read_all(&file);
+    assert!(is_changed || (file == sound && rest.is_empty() && read.is_ok()), "nothing was changed: {read:?}");
+}
+
+/// Bytes before the head of a bare stream.
+const BARE_START: usize = 24;
+
 /// A file that is truncated or has another end: its complete windows must resume to a valid file.
 pub fn prefix(data: &[u8]) {
     let mut input = Input::new(data);

@@ -17,7 +17,7 @@ pub mod values;
 pub type Target = fn(&[u8]);
 
 /// Every target by name; its folders in `corpus/` and `regressions/` have the same name.
-pub const TARGETS: [(&str, Target); 15] = [
+pub const TARGETS: [(&str, Target); 16] = [
     ("file", files::file),
     ("metadata", files::metadata),
     ("description", files::description),
@@ -27,6 +27,7 @@ pub const TARGETS: [(&str, Target); 15] = [
     ("forged", files::forged),
     ("decode", files::decode),
     ("render", files::render),
+    ("bare", files::bare),
     ("prefix", files::prefix),
     ("recovery", files::recovery),
     ("roundtrip", series::roundtrip),

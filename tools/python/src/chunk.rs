@@ -1,7 +1,7 @@
 //! Chunks of arrays as bare streams, for the codec of Zarr. Samples are little-endian, x fastest, then y, z and frames.
 #![allow(clippy::needless_pass_by_value, reason = "functions of Python own their arguments")]
 
-use crate::errors::borrowed;
+use crate::errors::{DamagedError, borrowed, raised};
 use crate::fork;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -40,15 +40,29 @@ pub(crate) fn encode<'py>(
     Ok(PyBytes::new(py, &fork::call(py, convert)?))
 }
 
-/// A decoded stream: its samples, its voxels along x, y and z, and frames, and the number of its bytes.
+/// Checks a request.
+#[pyfunction]
+pub(crate) fn check(request: &str) -> PyResult<()> {
+    let request: ConvertRequest = serde_json::from_str(request).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    request.check().map_err(raised)
+}
+
+/// A decoded stream: its samples, its voxels along x, y and z, and frames, and where the next one begins.
 type Decoded<'py> = (Bound<'py, PyArray1<u8>>, [usize; 4], usize);
 
-/// The stream at the start of `bytes`, of at most so many voxels and frames.
+/// The stream that begins at `at`, of at most so many voxels and frames.
 #[pyfunction]
-pub(crate) fn decode<'py>(py: Python<'py>, bytes: &[u8], most: [usize; 4], sample: &str) -> PyResult<Decoded<'py>> {
+pub(crate) fn decode<'py>(
+    py: Python<'py>,
+    bytes: &[u8],
+    at: usize,
+    most: [usize; 4],
+    sample: &str,
+) -> PyResult<Decoded<'py>> {
     let sample = named(sample)?;
+    let stream = bytes.get(at..).unwrap_or_default();
     let decode = || {
-        let (file, rest) = CoefficientFile::from_bare(NAME, bytes)?;
+        let (file, rest) = CoefficientFile::from_bare(NAME, stream)?;
         let [x, y, z] = file.grid.dims;
         let found = [x, y, z, file.frames()];
         if file.sample() != sample || file.channels() > 1 || found.iter().zip(most).any(|(found, most)| *found > most) {
@@ -60,8 +74,13 @@ pub(crate) fn decode<'py>(py: Python<'py>, bytes: &[u8], most: [usize; 4], sampl
         extract_into(&file, &ExtractConfig::new(&file), &mut samples, &Silent)?;
         Ok((samples, found, bytes.len() - rest.len()))
     };
-    let (samples, found, read) = fork::call(py, decode)?;
-    Ok((PyArray1::from_vec(py, samples), found, read))
+    // What mends a file is of no help here.
+    let plain = |error| match error {
+        Error::CoefficientFile { path, source } => Ok(Err(format!("{}: {source}", path.display()))),
+        other => Err(other),
+    };
+    let (samples, found, next) = fork::call(py, || decode().map(Ok).or_else(plain))?.map_err(DamagedError::new_err)?;
+    Ok((PyArray1::from_vec(py, samples), found, next))
 }
 
 fn named(sample: &str) -> PyResult<SampleType> {

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wavesplat::Result;
+use wavesplat::base::memory::for_reading;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{ConvertRequest, run};
 use wavesplat::file::merge::Shards;
@@ -29,9 +30,6 @@ pub(crate) struct Conversion {
     resume: bool,
     overwrite: bool,
 }
-
-/// A window of frames may take one part in this many of the memory.
-const SHARE: usize = 4;
 
 impl Conversion {
     fn request(&self) -> PyResult<ConvertRequest> {
@@ -100,7 +98,7 @@ pub(crate) fn convert_frames(
     let sample = SampleType::ALL.into_iter().find(|ty| ty.name() == sample);
     let times = times.map(|times| GivenTimes::List(times.into()));
     let request = conversion.request()?;
-    let (dims, memory) = (Some(dims), request.memory / SHARE);
+    let (dims, memory) = (Some(dims), for_reading(request.memory));
     let placed = OpenOptions { dims, sample, spacing, origin, ..OpenOptions::default() };
     let options = OpenOptions { times, time_unit, calendar, memory, ..placed };
     let open = |caller| formats::open_named_stream(name, FrameReader::new(iterator, caller), &options);
@@ -133,7 +131,7 @@ pub(crate) fn convert_arrays(
     let attributes = given_attributes(&attributes)?;
     let Chosen { source: name, variable, axes } = chosen;
     let request = conversion.request()?;
-    let options = OpenOptions { variable, axes, memory: request.memory / SHARE, ..OpenOptions::default() };
+    let options = OpenOptions { variable, axes, memory: for_reading(request.memory), ..OpenOptions::default() };
     let open = |caller| {
         let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
         formats::open_arrays(Path::new(&name), &arrays, &options)

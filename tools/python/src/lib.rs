@@ -20,7 +20,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _wavesplat {
     #[pymodule_export]
-    use super::chunk::{decode, encode};
+    use super::chunk::{check, decode, encode};
     #[pymodule_export]
     use super::convert::{convert_arrays, convert_frames, merge};
     #[pymodule_export]

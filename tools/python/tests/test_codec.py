@@ -57,13 +57,15 @@ def test_booleans_come_back():
         ("ztc", (6, 12, 3), (4, 12, 2)),
         ("yc", (6, 4), (6, 4)),
         ("cc", (3, 2), (3, 2)),
+        (None, (), ()),
     ],
 )
 def test_axes_may_be_in_any_order(axes, shape, chunks):
-    samples = np.random.default_rng(3).normal(size=shape).cumsum(axis=0).astype("f4")
+    samples = np.random.default_rng(3).normal(size=shape)
+    samples = np.asarray(samples.cumsum(axis=0) if shape else samples, "f4")
     found = stored(samples, chunks, WavesplatCodec(max_error=0.01, axes=axes))
     assert error(found, samples) <= 0.01
-    assert error(found, samples) > 0 or "c" in (axes or "")
+    assert error(found, samples) > 0 or "c" in (axes or "") or not shape
 
 
 def test_a_tolerance_refers_to_each_chunk_or_to_a_range():
@@ -94,7 +96,7 @@ def test_fill_values_stay_and_do_not_count(options):
     samples = smooth((16, 8, 8, 8), "i2")
     samples[:, :, 2:5, 3:] = -9999
     land = samples == -9999
-    missing = None if options else -9999
+    missing = "mask" if options else -9999
     found = stored(samples, (16, 8, 8, 8), WavesplatCodec(tolerance=0.01, missing=missing), **options)
     np.testing.assert_array_equal(found == -9999, land)
     assert error(found[~land], samples[~land]) <= 0.01 * np.ptp(samples[~land].astype("f8"))
@@ -116,6 +118,34 @@ def test_what_lies_beyond_the_array_takes_no_bytes(fill):
     whole.resize((64, 16, 9, 12))
     assert np.signbit(whole[-1, -1, -1, -1]) == np.signbit(fill)
     np.testing.assert_array_equal(whole[40], np.full((16, 9, 12), fill, "f4"))
+
+
+def test_one_value_is_kept_besides_nan():
+    samples = smooth((16, 8, 8, 8)) + 100
+    samples[:, :, 2:5, 3:] = 7
+    found = stored(samples, samples.shape, WavesplatCodec(tolerance=0.01), fill_value=7)
+    np.testing.assert_array_equal(found == 7, samples == 7)
+    with pytest.raises(ValueError, match="missing: is -9999.0, but the fill value of the array is 7"):
+        stored(samples, samples.shape, WavesplatCodec(tolerance=0.01, missing=-9999), fill_value=7)
+
+
+def test_filters_may_flatten_a_chunk():
+    from zarr.codecs.numcodecs import Delta
+
+    samples = smooth((16, 8, 9, 10))
+    found = stored(samples, (16, 8, 9, 7), WavesplatCodec(tolerance=0), filters=[Delta(dtype="f4")])
+    np.testing.assert_allclose(found, samples, rtol=1e-4, atol=1e-4)
+
+
+def test_settings_are_those_of_json():
+    codec = WavesplatCodec(max_error=np.float32(0.5), range=None, missing=np.int16(-9), axes="tzyx")
+    again = WavesplatCodec.from_dict(json.loads(json.dumps(codec.to_dict())))
+    assert (again, hash(again)) == (codec, hash(codec))
+    ranged = WavesplatCodec(tolerance=0.01, range=np.array([0, 2]))
+    assert WavesplatCodec.from_dict(json.loads(json.dumps(ranged.to_dict()))) == ranged
+    assert WavesplatCodec(tolerance=0, missing=np.nan) == WavesplatCodec(tolerance=0)
+    with pytest.raises(ValueError, match="a codec named 'zstd'"):
+        WavesplatCodec.from_dict({"name": "zstd"})
 
 
 def test_chunks_of_the_fill_value_alone_are_written_if_they_must_be():
@@ -168,7 +198,11 @@ def test_bytes_do_not_depend_on_who_writes():
 def test_wrong_settings_are_refused():
     samples = smooth((8, 4, 4, 4))
     for wrong, words in [
-        ({}, "takes tolerance or max_error"),
+        ({}, "tolerance: give this or max_error"),
+        ({"max_error": 1, "level": 20}, "level: takes 1 to 19"),
+        ({"max_error": 1, "range": ()}, "range: takes"),
+        ({"max_error": 1, "missing": "often"}, "missing: 'error' or 'mask'"),
+        ({"tolerance": 2}, "tolerance: takes 0 to 1"),
         ({"tolerance": 1, "max_error": 1}, "give one"),
         ({"tolerance": 1, "bound": "best"}, "bound: 'pointwise'"),
         ({"max_error": 1, "axes": "tzy"}, "axes: takes a letter"),
@@ -197,8 +231,9 @@ def test_damaged_chunks_are_named():
         cases.append(whole[:at] + bytes([whole[at] ^ (1 << rng.integers(8))]) + whole[at + 1 :])
     for case in cases:
         store._store_dict["c/0/0/0/0"] = prototype.from_bytes(case)
-        with pytest.raises((wavesplat.DamagedError, wavesplat.UnsupportedError), match="a chunk"):
+        with pytest.raises(wavesplat.DamagedError, match="a chunk: ") as raised:
             zarr.open_array(store, mode="r")[...]
+        assert "recover" not in str(raised.value)
 
 
 def test_chunks_of_another_array_are_refused():
@@ -210,3 +245,22 @@ def test_chunks_of_another_array_are_refused():
         another._store_dict["c/0/0/0/0"] = one._store_dict["c/0/0/0/0"]
         with pytest.raises(wavesplat.InputError, match="a chunk.*the array has"):
             zarr.open_array(another, mode="r")[...]
+
+
+def test_numcodecs_has_a_codec_too():
+    numcodecs = pytest.importorskip("numcodecs")
+    samples = smooth((2, 16, 5, 8, 9)[1:]).reshape(2, 8, 5, 8, 9)
+    config = {"id": "wavesplat", "max_error": 0.01}
+    codec = numcodecs.get_codec(config)
+    assert codec.get_config() == config
+    stored = codec.encode(samples)
+    assert 0 < error(codec.decode(stored), samples) <= 0.01
+    out = np.empty_like(samples)
+    codec.decode(stored, out)
+    assert error(out, codec.decode(stored)) == 0
+    relative = numcodecs.get_codec({"id": "wavesplat", "bound": "relative", "tolerance": 0.01})
+    found = relative.decode(relative.encode(samples))
+    assert (np.abs(found - samples) <= 0.01 * np.abs(samples)).all()
+    for damaged in (b"", stored[:20], stored[:-1], stored + b"x", stored[:4] + b"x" + stored[5:]):
+        with pytest.raises(wavesplat.DamagedError):
+            codec.decode(damaged)

@@ -43,6 +43,13 @@ def test_zarr(folder):
     assert names["group"]["data"].shape == wavesplat.open("run.wspl").shape
 
 
+def test_numcodecs():
+    pytest.importorskip("numcodecs")
+    names = {}
+    exec(blocks("numcodecs")[0], names)
+    assert 0 < np.abs(names["again"] - names["array"]).max() <= 0.05
+
+
 def test_pyvista(folder):
     pyvista = pytest.importorskip("pyvista")
     pyvista.OFF_SCREEN = True

@@ -10,7 +10,7 @@ from conftest import smooth
 from test_xarray import ocean
 
 import wavesplat
-from wavesplat import _vtk
+from wavesplat import _volumes
 
 SCRIPT = """
 import inspect
@@ -82,7 +82,8 @@ def test_uneven_axes_make_a_rectilinear_grid(pvpython, tmp_path):
     ocean("f4").to_wavesplat(tmp_path / "a.wspl", block=8, window=4)
     file = wavesplat.open(tmp_path / "a.wspl")
     _, whole, *_ = shown(pvpython, tmp_path / "a.wspl", tmp_path)
-    assert whole[0] == ("vtkImageData" if _vtk.uneven(file) is None else "vtkRectilinearGrid")
+    assert whole[0] == "vtkRectilinearGrid"
+    assert whole[4:10] == [str(float(end)) for along in _volumes.places(file) for end in (along[0], along[-1])]
 
 
 def test_pyvista_has_places_and_samples(path, file, decoded):
@@ -98,12 +99,19 @@ def test_pyvista_has_places_and_samples(path, file, decoded):
         file.to_pyvista(0, z=slice(None, None, 2))
 
 
-def test_places_that_are_not_even_are_found(tmp_path):
+def test_places_are_coordinates_and_ascend(tmp_path):
     dataset = ocean("f4")
     dataset.to_wavesplat(tmp_path / "a.wspl", block=8, window=4)
+    where = _volumes.places(wavesplat.open(tmp_path / "a.wspl"))
+    assert not _volumes.is_even(where)
+    np.testing.assert_array_equal(where[2], -dataset.depth.values[::-1])
+    np.testing.assert_array_equal(where[1], dataset.lat.values[::-1])
+
+
+def test_even_depths_are_negative(tmp_path):
+    dataset = ocean("f4").assign_coords(depth=("depth", np.arange(5) * 2.0, {"positive": "down", "units": "m"}))
+    dataset.to_wavesplat(tmp_path / "a.wspl", block=8, window=4)
     file = wavesplat.open(tmp_path / "a.wspl")
-    found = _vtk.uneven(file)
-    assert found is not None
-    assert [len(along) for along in found] == list(file.shape[:0:-1])
-    np.testing.assert_array_equal(found[2], -dataset.depth.values[::-1])
-    np.testing.assert_array_equal(found[1], dataset.lat.values[::-1])
+    where = _volumes.places(file)
+    assert _volumes.is_even(where)
+    assert (_volumes.corner(where)[2], _volumes.distances(file, where)[2]) == (-8.0, 2.0)

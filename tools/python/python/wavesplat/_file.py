@@ -451,7 +451,7 @@ class File:
             x: Which voxels along x.
 
         """
-        from ._vtk import to_pyvista
+        from ._volumes import to_pyvista
 
         return to_pyvista(self, frame, (z, y, x))
 

@@ -23,6 +23,7 @@ def _layer(path: str) -> Layer:
     import dask.array as da
 
     from ._file import open
+    from ._volumes import corner, distances, places
 
     file = open(path)
     levels = [file, *(open(path, lod=lod) for lod in range(1, file.coarsest + 1))]
@@ -32,11 +33,11 @@ def _layer(path: str) -> Layer:
     ]
     times = file.times
     step = float(times[1] - times[0]) if len(times) > 1 and times[1] > times[0] else 1.0
-    spacing, origin = file.spacing[::-1], file.origin[::-1]
+    where = places(file)
     settings: dict[str, Any] = {
         "name": file.variable or "samples",
-        "scale": (step, *spacing),
-        "translate": (float(times[0]) if len(times) else 0.0, *origin),
+        "scale": (step, *distances(file, where)[::-1]),
+        "translate": (float(times[0]) if len(times) else 0.0, *corner(where)[::-1]),
         "contrast_limits": file.range,
         "axis_labels": file.dims,
         "metadata": {"path": file.path, "unit": file.unit, "time_unit": file.time_unit},

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from paraview.util.vtkAlgorithm import VTKPythonAlgorithmBase, smdomain, smhint, smproperty, smproxy
 from vtkmodules.numpy_interface import dataset_adapter
-from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.util.numpy_support import numpy_to_volumes
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData, vtkRectilinearGrid
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm, vtkStreamingDemandDrivenPipeline
 
 import wavesplat
-from wavesplat._vtk import arrays, name, times, uneven
+from wavesplat._volumes import arrays, corner, distances, is_even, name, places, times
 
 _PIPELINE = vtkStreamingDemandDrivenPipeline
 
@@ -64,7 +64,7 @@ class WavesplatReader(VTKPythonAlgorithmBase):
 
     def RequestDataObject(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Makes an empty data set of the right kind."""
-        kind = vtkImageData if uneven(self._open()) is None else vtkRectilinearGrid
+        kind = vtkImageData if is_even(places(self._open())) else vtkRectilinearGrid
         information = outputs.GetInformationObject(0)
         if not isinstance(vtkDataObject.GetData(information), kind):
             information.Set(vtkDataObject.DATA_OBJECT(), kind())
@@ -79,8 +79,8 @@ class WavesplatReader(VTKPythonAlgorithmBase):
         ends = [end for length in file.shape[:0:-1] for end in (0, length - 1)]
         information.Set(_PIPELINE.WHOLE_EXTENT(), ends, 6)
         information.Set(vtkAlgorithm.CAN_PRODUCE_SUB_EXTENT(), 1)
-        information.Set(vtkDataObject.SPACING(), list(file.spacing), 3)
-        information.Set(vtkDataObject.ORIGIN(), list(file.origin), 3)
+        information.Set(vtkDataObject.SPACING(), distances(file, places(file)), 3)
+        information.Set(vtkDataObject.ORIGIN(), corner(places(file)), 3)
         return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
@@ -93,13 +93,13 @@ class WavesplatReader(VTKPythonAlgorithmBase):
         x, y, z = (slice(extent[2 * axis], extent[2 * axis + 1] + 1) for axis in range(3))
         output = vtkDataObject.GetData(information)
         output.SetExtent(extent)
-        places = uneven(file)
-        if places is None:
-            output.SetSpacing(file.spacing)
-            output.SetOrigin(file.origin)
+        where = places(file)
+        if is_even(where):
+            output.SetSpacing(distances(file, where))
+            output.SetOrigin(corner(where))
         else:
-            for axis, part, along in zip("XYZ", (x, y, z), places, strict=True):
-                getattr(output, f"Set{axis}Coordinates")(numpy_to_vtk(along[part], deep=True))
+            for axis, part, along in zip("XYZ", (x, y, z), where, strict=True):
+                getattr(output, f"Set{axis}Coordinates")(numpy_to_volumes(along[part], deep=True))
         output.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), when[frame])
         for called, samples in arrays(file, frame, (z, y, x)):
             dataset_adapter.WrapDataObject(output).PointData.append(samples, called)

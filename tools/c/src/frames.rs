@@ -1,0 +1,111 @@
+//! What frames are.
+#![allow(unsafe_code)]
+
+use crate::text;
+use std::ffi::c_char;
+use wavesplat::base::sample::SampleType;
+use wavesplat::{Error, Result};
+
+/// Unsigned integers of 8 bits.
+pub const WAVESPLAT_U8: u32 = 0;
+/// Signed integers of 8 bits.
+pub const WAVESPLAT_I8: u32 = 1;
+/// Unsigned integers of 16 bits.
+pub const WAVESPLAT_U16: u32 = 2;
+/// Signed integers of 16 bits.
+pub const WAVESPLAT_I16: u32 = 3;
+/// Unsigned integers of 32 bits.
+pub const WAVESPLAT_U32: u32 = 4;
+/// Signed integers of 32 bits.
+pub const WAVESPLAT_I32: u32 = 5;
+/// Floats of 16 bits.
+pub const WAVESPLAT_F16: u32 = 6;
+/// Floats of 32 bits.
+pub const WAVESPLAT_F32: u32 = 7;
+/// Floats of 64 bits.
+pub const WAVESPLAT_F64: u32 = 8;
+
+const SAMPLES: [SampleType; 9] = [
+    SampleType::U8,
+    SampleType::I8,
+    SampleType::U16,
+    SampleType::I16,
+    SampleType::U32,
+    SampleType::I32,
+    SampleType::F16,
+    SampleType::F32,
+    SampleType::F64,
+];
+
+/// The frames of a run. Set all fields that are not needed to 0.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct WavesplatFrames {
+    /// Voxels along x, y and z.
+    pub dims: [usize; 3],
+    /// The type of the samples: `WAVESPLAT_F32` or another.
+    pub sample: u32,
+    /// The distance of voxels along x, y and z; 0 for 1.
+    pub spacing: [f64; 3],
+    /// The place of the first voxel.
+    pub origin: [f64; 3],
+    /// The time of the first frame.
+    pub first_time: f64,
+    /// The time from each frame to the next; 0 if frames have no times.
+    pub time_step: f64,
+    /// The unit of times, such as "s"; or null.
+    pub time_unit: *const c_char,
+    /// The name of what the samples are, such as "pressure"; or null.
+    pub variable: *const c_char,
+    /// Their unit, such as "Pa"; or null.
+    pub unit: *const c_char,
+}
+
+/// The same, checked.
+#[derive(Debug, Clone)]
+pub(crate) struct Frames {
+    pub(crate) dims: [usize; 3],
+    pub(crate) sample: SampleType,
+    pub(crate) spacing: [f64; 3],
+    pub(crate) origin: [f64; 3],
+    /// The time of the first frame, and between frames.
+    pub(crate) times: Option<[f64; 2]>,
+    pub(crate) time_unit: Option<String>,
+    pub(crate) variable: Option<String>,
+    pub(crate) unit: Option<String>,
+}
+
+impl Frames {
+    /// # Safety
+    /// The texts of `given` are null or end with a 0.
+    pub(crate) unsafe fn new(given: &WavesplatFrames) -> Result<Self> {
+        let sample = SAMPLES.get(given.sample as usize).copied();
+        let sample = sample.ok_or_else(|| Error::value("sample", given.sample, "is no type of samples"))?;
+        // SAFETY: the caller's.
+        let text = |name, text| unsafe { text::optional(name, text) }.map(|text| text.map(String::from));
+        let times = (given.time_step != 0.0).then_some([given.first_time, given.time_step]);
+        let frames = Self {
+            dims: given.dims,
+            sample,
+            spacing: given.spacing.map(|step| if step == 0.0 { 1.0 } else { step }),
+            origin: given.origin,
+            times,
+            time_unit: text("time_unit", given.time_unit)?,
+            variable: text("variable", given.variable)?,
+            unit: text("unit", given.unit)?,
+        };
+        frames.bytes().map(|_| frames)
+    }
+
+    /// Bytes of a frame.
+    pub(crate) fn bytes(&self) -> Result<usize> {
+        let voxels = self.dims.into_iter().try_fold(self.sample.size(), usize::checked_mul);
+        let bytes = voxels.filter(|bytes| (1..isize::MAX as usize).contains(bytes));
+        bytes.ok_or_else(|| Error::setting("dims", format!("{:?} voxels are none, or too many", self.dims)))
+    }
+}
+
+/// The number of a type of samples.
+pub(crate) fn number_of(sample: SampleType) -> u32 {
+    SAMPLES.iter().position(|known| *known == sample).unwrap_or_default() as u32
+}

@@ -1,0 +1,154 @@
+//! Samples of coefficient files.
+#![allow(unsafe_code)]
+
+use crate::frames::number_of;
+use crate::status::answer;
+use crate::text::{pointed, pointed_mut, required};
+use std::ffi::{c_char, c_void};
+use wavesplat::base::mapped::Access;
+use wavesplat::base::progress::Silent;
+use wavesplat::extract::{ExtractConfig, extract_into};
+use wavesplat::file::CoefficientFile;
+use wavesplat::{Error, Region, Result};
+
+/// An open file.
+pub struct WavesplatFile(CoefficientFile);
+
+/// What is known of a file.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default)]
+pub struct WavesplatInfo {
+    /// Voxels along x, y and z, at the level of detail.
+    pub dims: [usize; 3],
+    /// Number of frames.
+    pub frames: usize,
+    /// Channels: 1, or 3 for colours.
+    pub channels: usize,
+    /// The type of the samples: `WAVESPLAT_F32` or another.
+    pub sample: u32,
+    /// Bytes of a sample.
+    pub sample_bytes: usize,
+    /// The distance of voxels along x, y and z.
+    pub spacing: [f64; 3],
+    /// The place of the first voxel.
+    pub origin: [f64; 3],
+    /// The largest error of any sample.
+    pub reached: f64,
+    /// Whether frames have times.
+    pub has_times: bool,
+}
+
+/// Opens a file. `lod` is the level of detail: every 2^lod-th voxel along each axis is there, 0 for all.
+///
+/// # Safety
+/// `path` ends with a 0. `file` takes a pointer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_open(path: *const c_char, lod: u32, file: *mut *mut WavesplatFile) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's.
+        let (path, file) = unsafe { (required("path", path)?, pointed_mut("file", file)?) };
+        // A page of a map that is lost would end the host.
+        let open = CoefficientFile::open_with(path, Access::Read)?.with_detail(lod)?;
+        *file = Box::into_raw(Box::new(WavesplatFile(open)));
+        Ok(())
+    })
+}
+
+/// Says what is known of a file.
+///
+/// # Safety
+/// `file` is open. `info` takes the answer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_info(file: *const WavesplatFile, info: *mut WavesplatInfo) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's.
+        let (WavesplatFile(file), info) = unsafe { (pointed("file", file)?, pointed_mut("info", info)?) };
+        let metadata = file.metadata();
+        *info = WavesplatInfo {
+            dims: file.grid.dims,
+            frames: file.frames(),
+            channels: file.channels(),
+            sample: number_of(file.sample()),
+            sample_bytes: file.sample().size(),
+            spacing: file.grid.spacing,
+            origin: file.grid.origin,
+            reached: metadata.windows.iter().map(|window| window.reached).fold(0.0, f64::max),
+            has_times: !metadata.times.is_empty(),
+        };
+        Ok(())
+    })
+}
+
+/// Gives the times of `count` frames from `first` on.
+///
+/// # Safety
+/// `file` is open. `times` takes `count` numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_times(
+    file: *const WavesplatFile,
+    first: usize,
+    count: usize,
+    times: *mut f64,
+) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's.
+        let WavesplatFile(file) = unsafe { pointed("file", file)? };
+        let found = first.checked_add(count).and_then(|end| file.metadata().times.get(first..end));
+        let found = found.ok_or_else(|| Error::value("first", first, format!("and {count} more have no times")))?;
+        // SAFETY: the caller's.
+        unsafe { room("times", times, count)? }.copy_from_slice(found);
+        Ok(())
+    })
+}
+
+/// Gives the samples of `count` frames from `first` on, of the voxels from `start` up to but without `end` along x, y and z, or of
+/// all with null: frame after frame, x fastest, little-endian. `channel` is 0, or one of the three of colours.
+///
+/// # Safety
+/// `file` is open. `start` and `end` are null or three numbers. `samples` takes `bytes` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_read(
+    file: *const WavesplatFile,
+    first: usize,
+    count: usize,
+    start: *const usize,
+    end: *const usize,
+    channel: usize,
+    samples: *mut c_void,
+    bytes: usize,
+) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's.
+        let (WavesplatFile(file), out) = unsafe { (pointed("file", file)?, room("samples", samples.cast(), bytes)?) };
+        // SAFETY: the caller's.
+        let place = |at: *const usize, all: [usize; 3]| if at.is_null() { all } else { unsafe { *at.cast() } };
+        let region = Region { start: place(start, [0; 3]), end: place(end, file.grid.dims) };
+        let last = first.checked_add(count).filter(|end| *end <= file.frames());
+        let last = last.ok_or_else(|| Error::value("first", first, format!("and {count} more are not in the file")))?;
+        let config = ExtractConfig { frames: (first..last).collect(), region, channel, ..ExtractConfig::new(file) };
+        extract_into(file, &config, out, &Silent).map(drop)
+    })
+}
+
+/// Closes a file. Null is fine.
+///
+/// # Safety
+/// `file` is not used any more.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_close(file: *mut WavesplatFile) {
+    if !file.is_null() {
+        // SAFETY: `wavesplat_open` made it by a box.
+        drop(unsafe { Box::from_raw(file) });
+    }
+}
+
+/// Memory of the caller.
+///
+/// # Safety
+/// `at` is null or points to `count` of `T` that nobody else uses for `'a`.
+unsafe fn room<'a, T>(name: &'static str, at: *mut T, count: usize) -> Result<&'a mut [T]> {
+    // SAFETY: the caller's.
+    unsafe { pointed_mut(name, at)? };
+    // SAFETY: the caller's.
+    Ok(unsafe { std::slice::from_raw_parts_mut(at, count) })
+}

@@ -1,0 +1,103 @@
+! wavesplat for Fortran: the functions of wavesplat.h, which says what they do.
+module wavesplat
+    use, intrinsic :: iso_c_binding
+    implicit none
+    private
+    public :: wavesplat_frames, wavesplat_create, wavesplat_push, wavesplat_finish, wavesplat_abandon, wavesplat_check
+
+    integer(c_int32_t), parameter, public :: wavesplat_ok = 0, wavesplat_f32 = 7, wavesplat_f64 = 8
+
+    type, bind(c) :: wavesplat_frames
+        integer(c_size_t) :: dims(3)
+        integer(c_int32_t) :: sample
+        real(c_double) :: spacing(3) = 0, origin(3) = 0, first_time = 0, time_step = 0
+        type(c_ptr) :: time_unit = c_null_ptr, variable = c_null_ptr, unit = c_null_ptr
+    end type
+
+    interface
+        integer(c_int32_t) function create(path, frames, settings, replace, writer) bind(c, name="wavesplat_create")
+            import
+            character(kind=c_char), intent(in) :: path(*), settings(*)
+            type(wavesplat_frames), intent(in) :: frames
+            logical(c_bool), value :: replace
+            type(c_ptr), intent(out) :: writer
+        end function
+
+        integer(c_int32_t) function push(writer, samples, strides) bind(c, name="wavesplat_push")
+            import
+            type(c_ptr), value :: writer, samples, strides
+        end function
+
+        integer(c_int32_t) function wavesplat_finish(writer) bind(c)
+            import
+            type(c_ptr), value :: writer
+        end function
+
+        subroutine wavesplat_abandon(writer) bind(c)
+            import
+            type(c_ptr), value :: writer
+        end subroutine
+
+        type(c_ptr) function message() bind(c, name="wavesplat_message")
+            import
+        end function
+
+        integer(c_size_t) function strlen(text) bind(c)
+            import
+            type(c_ptr), value :: text
+        end function
+    end interface
+
+    ! Adds a frame: a whole array, or a part of one such as field(1:n, 1:n, 1:n).
+    interface wavesplat_push
+        procedure push_f32, push_f64
+    end interface
+
+contains
+
+    ! Begins a file.
+    integer(c_int32_t) function wavesplat_create(path, frames, settings, writer) result(status)
+        character(*), intent(in) :: path, settings
+        type(wavesplat_frames), intent(in) :: frames
+        type(c_ptr), intent(out) :: writer
+        status = create(path // c_null_char, frames, settings // c_null_char, .true._c_bool, writer)
+    end function
+
+    integer(c_int32_t) function push_f32(writer, field) result(status)
+        type(c_ptr), intent(in) :: writer
+        real(c_float), intent(in), target :: field(:, :, :)
+        integer(c_size_t), target :: strides(3)
+        strides = [step(c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1))), &
+                   step(c_loc(field(1, 1, 1)), c_loc(field(1, min(2, size(field, 2)), 1))), &
+                   step(c_loc(field(1, 1, 1)), c_loc(field(1, 1, min(2, size(field, 3)))))]
+        status = push(writer, c_loc(field(1, 1, 1)), c_loc(strides))
+    end function
+
+    integer(c_int32_t) function push_f64(writer, field) result(status)
+        type(c_ptr), intent(in) :: writer
+        real(c_double), intent(in), target :: field(:, :, :)
+        integer(c_size_t), target :: strides(3)
+        strides = [step(c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1))), &
+                   step(c_loc(field(1, 1, 1)), c_loc(field(1, min(2, size(field, 2)), 1))), &
+                   step(c_loc(field(1, 1, 1)), c_loc(field(1, 1, min(2, size(field, 3)))))]
+        status = push(writer, c_loc(field(1, 1, 1)), c_loc(strides))
+    end function
+
+    ! Bytes from a sample to another.
+    integer(c_size_t) function step(from, to)
+        type(c_ptr), intent(in) :: from, to
+        step = transfer(to, 0_c_size_t) - transfer(from, 0_c_size_t)
+    end function
+
+    ! Stops with the message of an error.
+    subroutine wavesplat_check(status)
+        integer(c_int32_t), intent(in) :: status
+        character(kind=c_char), pointer :: text(:)
+        type(c_ptr) :: said
+        if (status == wavesplat_ok) return
+        said = message()
+        call c_f_pointer(said, text, [strlen(said)])
+        write (*, '(*(a))') text
+        error stop
+    end subroutine
+end module

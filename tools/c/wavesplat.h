@@ -1,0 +1,197 @@
+/* wavesplat for C and C++: frames in from a running simulation, samples out.
+ *
+ * All functions but wavesplat_message, wavesplat_version, wavesplat_abandon and wavesplat_close return WAVESPLAT_OK or what went
+ * wrong; then wavesplat_message says it in words. They are safe to call from any thread, but only from one at a time for the same
+ * writer. Several threads may read the same file.
+ *
+ * tools/c/tests/header.rs makes this file of the sources. */
+
+#ifndef WAVESPLAT_H
+#define WAVESPLAT_H
+
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+// Success.
+#define WAVESPLAT_OK 0
+
+// An argument or a setting is wrong, or a path cannot be used.
+#define WAVESPLAT_ARGUMENT 1
+
+// Reading or writing failed.
+#define WAVESPLAT_IO 2
+
+// The frames cannot be converted: samples are missing, say.
+#define WAVESPLAT_INPUT 3
+
+// A coefficient file is damaged, or is none.
+#define WAVESPLAT_DAMAGED 4
+
+// A file changed while it was open.
+#define WAVESPLAT_CHANGED 5
+
+// A mistake of the library. Please report it.
+#define WAVESPLAT_BUG 6
+
+// Unsigned integers of 8 bits.
+#define WAVESPLAT_U8 0
+
+// Signed integers of 8 bits.
+#define WAVESPLAT_I8 1
+
+// Unsigned integers of 16 bits.
+#define WAVESPLAT_U16 2
+
+// Signed integers of 16 bits.
+#define WAVESPLAT_I16 3
+
+// Unsigned integers of 32 bits.
+#define WAVESPLAT_U32 4
+
+// Signed integers of 32 bits.
+#define WAVESPLAT_I32 5
+
+// Floats of 16 bits.
+#define WAVESPLAT_F16 6
+
+// Floats of 32 bits.
+#define WAVESPLAT_F32 7
+
+// Floats of 64 bits.
+#define WAVESPLAT_F64 8
+
+// An open file.
+typedef struct WavesplatFile WavesplatFile;
+
+// A file that is being written.
+typedef struct WavesplatWriter WavesplatWriter;
+
+// The frames of a run. Set all fields that are not needed to 0.
+typedef struct WavesplatFrames {
+  // Voxels along x, y and z.
+  size_t dims[3];
+  // The type of the samples: `WAVESPLAT_F32` or another.
+  uint32_t sample;
+  // The distance of voxels along x, y and z; 0 for 1.
+  double spacing[3];
+  // The place of the first voxel.
+  double origin[3];
+  // The time of the first frame.
+  double first_time;
+  // The time from each frame to the next; 0 if frames have no times.
+  double time_step;
+  // The unit of times, such as "s"; or null.
+  const char *time_unit;
+  // The name of what the samples are, such as "pressure"; or null.
+  const char *variable;
+  // Their unit, such as "Pa"; or null.
+  const char *unit;
+} WavesplatFrames;
+
+// What is known of a file.
+typedef struct WavesplatInfo {
+  // Voxels along x, y and z, at the level of detail.
+  size_t dims[3];
+  // Number of frames.
+  size_t frames;
+  // Channels: 1, or 3 for colours.
+  size_t channels;
+  // The type of the samples: `WAVESPLAT_F32` or another.
+  uint32_t sample;
+  // Bytes of a sample.
+  size_t sample_bytes;
+  // The distance of voxels along x, y and z.
+  double spacing[3];
+  // The place of the first voxel.
+  double origin[3];
+  // The largest error of any sample.
+  double reached;
+  // Whether frames have times.
+  bool has_times;
+} WavesplatInfo;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// What went wrong in the last call of this thread that failed, in English and UTF-8. It is valid until the next call that fails.
+const char *wavesplat_message(void);
+
+// The version of the library, such as "0.1.0". Versions with the same first number, or 0 and the same second, fit together.
+const char *wavesplat_version(void);
+
+// Begins a coefficient file of frames that `wavesplat_push` gives. It gets its name when it is finished; until then it is
+// `path` with ".part".
+//
+// `settings` is a text in JSON, such as `{"max_error": 0.05}` or `{"tolerance": 0.001, "keep": "range"}`, or null. The names
+// are those of the options of `wavesplat convert`, with underscores. A file of this name is an error unless `replace`.
+//
+// Texts end with a 0. `writer` takes a pointer.
+int32_t wavesplat_create(const char *path,
+                         const struct WavesplatFrames *frames,
+                         const char *settings,
+                         bool replace,
+                         struct WavesplatWriter **writer);
+
+// Adds a frame: copies it, and returns as soon as the conversion can take it.
+//
+// `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. After an error
+// the file cannot be finished.
+//
+// `samples` and `strides` reach all samples of a frame.
+int32_t wavesplat_push(struct WavesplatWriter *writer,
+                       const void *samples,
+                       const ptrdiff_t *strides);
+
+// Ends a file after its last frame, waits until it is whole, and frees the writer, also after an error.
+//
+// `writer` is not used any more.
+int32_t wavesplat_finish(struct WavesplatWriter *writer);
+
+// Ends a file that shall not be finished, and frees the writer. Its finished windows stay in `path` with ".part", from which
+// `wavesplat recover` makes a file.
+//
+// `writer` is not used any more.
+void wavesplat_abandon(struct WavesplatWriter *writer);
+
+// Opens a file. `lod` is the level of detail: every 2^lod-th voxel along each axis is there, 0 for all.
+//
+// `path` ends with a 0. `file` takes a pointer.
+int32_t wavesplat_open(const char *path, uint32_t lod, struct WavesplatFile **file);
+
+// Says what is known of a file.
+//
+// `file` is open. `info` takes the answer.
+int32_t wavesplat_info(const struct WavesplatFile *file, struct WavesplatInfo *info);
+
+// Gives the times of `count` frames from `first` on.
+//
+// `file` is open. `times` takes `count` numbers.
+int32_t wavesplat_times(const struct WavesplatFile *file, size_t first, size_t count, double *times);
+
+// Gives the samples of `count` frames from `first` on, of the voxels from `start` up to but without `end` along x, y and z, or of
+// all with null: frame after frame, x fastest, little-endian. `channel` is 0, or one of the three of colours.
+//
+// `file` is open. `start` and `end` are null or three numbers. `samples` takes `bytes` bytes.
+int32_t wavesplat_read(const struct WavesplatFile *file,
+                       size_t first,
+                       size_t count,
+                       const size_t *start,
+                       const size_t *end,
+                       size_t channel,
+                       void *samples,
+                       size_t bytes);
+
+// Closes a file. Null is fine.
+//
+// `file` is not used any more.
+void wavesplat_close(struct WavesplatFile *file);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* WAVESPLAT_H */
