@@ -149,9 +149,9 @@ impl WavesplatWriter {
     fn stop(&mut self, is_abandoned: bool) -> Result<()> {
         let Some(Running { outgoing, conversion }) = self.running.take() else { return Ok(()) };
         if is_abandoned {
-            outgoing.abandon()
+            outgoing.abandon();
         } else {
-            drop(outgoing)
+            drop(outgoing);
         }
         conversion.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }

@@ -1,4 +1,5 @@
 //! The examples are compiled and run as users would, by the compilers that are there.
+#![allow(clippy::print_stderr, reason = "says what is not run")]
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ fn library() -> PathBuf {
 /// compiler.
 fn run(compiler: &str, options: &[&str], sources: &[&str]) -> Option<(String, CoefficientFile)> {
     if Command::new(compiler).arg("--version").output().is_err() {
-        println!("not run: there is no {compiler}");
+        eprintln!("not run: there is no {compiler}");
         return None;
     }
     let (folder, library) = (tempfile::tempdir().expect("a folder"), library());

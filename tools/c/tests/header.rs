@@ -29,7 +29,7 @@ fn the_header_is_that_of_the_sources() {
         ..Config::default()
     };
     let sources = ["status", "frames", "write", "read"].map(|name| folder.join(format!("src/{name}.rs")));
-    let builder = sources.iter().fold(Builder::new().with_config(config), |builder, source| builder.with_src(source));
+    let builder = sources.iter().fold(Builder::new().with_config(config), Builder::with_src);
     let mut made = Vec::new();
     builder.generate().expect("the sources are read").write(&mut made);
     let made = String::from_utf8(made).expect("text").replace("// # Safety\n", "");
