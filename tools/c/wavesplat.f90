@@ -1,6 +1,7 @@
 ! wavesplat for Fortran: the functions of wavesplat.h, which says what they do.
 module wavesplat
     use, intrinsic :: iso_c_binding
+    use, intrinsic :: iso_fortran_env, only: error_unit
     implicit none
     private
     public :: wavesplat_frames, wavesplat_create, wavesplat_push, wavesplat_finish, wavesplat_abandon, wavesplat_check
@@ -19,13 +20,20 @@ module wavesplat
             import
             character(kind=c_char), intent(in) :: path(*), settings(*)
             type(wavesplat_frames), intent(in) :: frames
-            logical(c_bool), value :: replace
+            integer(c_int32_t), value :: replace
             type(c_ptr), intent(out) :: writer
         end function
 
         integer(c_int32_t) function push(writer, samples, strides) bind(c, name="wavesplat_push")
             import
             type(c_ptr), value :: writer, samples, strides
+        end function
+
+        integer(c_int32_t) function frame(writer, dims, sample) bind(c, name="wavesplat_frame")
+            import
+            type(c_ptr), value :: writer
+            integer(c_size_t), intent(out) :: dims(3)
+            integer(c_int32_t), intent(out) :: sample
         end function
 
         integer(c_int32_t) function wavesplat_finish(writer) bind(c)
@@ -55,18 +63,22 @@ module wavesplat
 
 contains
 
-    ! Begins a file.
-    integer(c_int32_t) function wavesplat_create(path, frames, settings, writer) result(status)
+    ! Begins a file, in place of an old one if told so.
+    integer(c_int32_t) function wavesplat_create(path, frames, settings, replace, writer) result(status)
         character(*), intent(in) :: path, settings
         type(wavesplat_frames), intent(in) :: frames
+        logical, intent(in) :: replace
         type(c_ptr), intent(out) :: writer
-        status = create(path // c_null_char, frames, settings // c_null_char, .true._c_bool, writer)
+        integer(c_int32_t) :: replaces
+        replaces = merge(1_c_int32_t, 0_c_int32_t, replace)
+        status = create(trim(path) // c_null_char, frames, settings // c_null_char, replaces, writer)
     end function
 
     integer(c_int32_t) function push_f32(writer, field) result(status)
         type(c_ptr), intent(in) :: writer
         real(c_float), intent(in), target :: field(:, :, :)
         integer(c_size_t), target :: strides(3)
+        call check_frame(writer, shape(field, c_size_t), wavesplat_f32)
         strides = [step(c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1))), &
                    step(c_loc(field(1, 1, 1)), c_loc(field(1, min(2, size(field, 2)), 1))), &
                    step(c_loc(field(1, 1, 1)), c_loc(field(1, 1, min(2, size(field, 3)))))]
@@ -77,11 +89,26 @@ contains
         type(c_ptr), intent(in) :: writer
         real(c_double), intent(in), target :: field(:, :, :)
         integer(c_size_t), target :: strides(3)
+        call check_frame(writer, shape(field, c_size_t), wavesplat_f64)
         strides = [step(c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1))), &
                    step(c_loc(field(1, 1, 1)), c_loc(field(1, min(2, size(field, 2)), 1))), &
                    step(c_loc(field(1, 1, 1)), c_loc(field(1, 1, min(2, size(field, 3)))))]
         status = push(writer, c_loc(field(1, 1, 1)), c_loc(strides))
     end function
+
+    ! Stops unless a field is what the frames of a writer are.
+    subroutine check_frame(writer, dims, sample)
+        type(c_ptr), intent(in) :: writer
+        integer(c_size_t), intent(in) :: dims(3)
+        integer(c_int32_t), intent(in) :: sample
+        integer(c_size_t) :: expected(3)
+        integer(c_int32_t) :: kind_of
+        call wavesplat_check(frame(writer, expected, kind_of))
+        if (all(dims == expected) .and. sample == kind_of) return
+        write (error_unit, '(a, 3(1x, i0), a, 3(1x, i0))') 'wavesplat_push: a field of', dims, &
+            ', or of another kind, for frames of', expected
+        error stop
+    end subroutine
 
     ! Bytes from a sample to another.
     integer(c_size_t) function step(from, to)
@@ -97,7 +124,7 @@ contains
         if (status == wavesplat_ok) return
         said = message()
         call c_f_pointer(said, text, [strlen(said)])
-        write (*, '(*(a))') text
+        write (error_unit, '(*(a))') text
         error stop
     end subroutine
 end module

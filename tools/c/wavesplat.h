@@ -1,8 +1,7 @@
 /* wavesplat for C and C++: frames in from a running simulation, samples out.
  *
- * All functions but wavesplat_message, wavesplat_version, wavesplat_abandon and wavesplat_close return WAVESPLAT_OK or what went
- * wrong; then wavesplat_message says it in words. They are safe to call from any thread, but only from one at a time for the same
- * writer. Several threads may read the same file.
+ * Functions that return a number return WAVESPLAT_OK or an error code; wavesplat_message then has the reason in words. They can be
+ * called from any thread, but only from one at a time for the same writer. Several threads may read the same file.
  *
  * tools/c/tests/header.rs makes this file of the sources. */
 
@@ -33,7 +32,7 @@
 // A file changed while it was open.
 #define WAVESPLAT_CHANGED 5
 
-// A mistake of the library. Please report it.
+// A bug in the library. Please report it.
 #define WAVESPLAT_BUG 6
 
 // Unsigned integers of 8 bits.
@@ -69,7 +68,7 @@ typedef struct WavesplatFile WavesplatFile;
 // A file that is being written.
 typedef struct WavesplatWriter WavesplatWriter;
 
-// The frames of a run. Set all fields that are not needed to 0.
+// The frames of a run: regular in space and time. Set all fields that are not needed to 0. A plane has 1 voxel along z.
 typedef struct WavesplatFrames {
   // Voxels along x, y and z.
   size_t dims[3];
@@ -83,7 +82,7 @@ typedef struct WavesplatFrames {
   double first_time;
   // The time from each frame to the next; 0 if frames have no times.
   double time_step;
-  // The unit of times, such as "s"; or null.
+  // The unit of times, such as "s" or "hours since 2000-01-01"; or null.
   const char *time_unit;
   // The name of what the samples are, such as "pressure"; or null.
   const char *variable;
@@ -91,7 +90,7 @@ typedef struct WavesplatFrames {
   const char *unit;
 } WavesplatFrames;
 
-// What is known of a file.
+// The description of a file.
 typedef struct WavesplatInfo {
   // Voxels along x, y and z, at the level of detail.
   size_t dims[3];
@@ -126,56 +125,70 @@ const char *wavesplat_version(void);
 // Begins a coefficient file of frames that `wavesplat_push` gives. It gets its name when it is finished; until then it is
 // `path` with ".part".
 //
-// `settings` is a text in JSON, such as `{"max_error": 0.05}` or `{"tolerance": 0.001, "keep": "range"}`, or null. The names
-// are those of the options of `wavesplat convert`, with underscores. A file of this name is an error unless `replace`.
+// `settings` is JSON, such as `{"max_error": 0.05}` or `{"tolerance": 0.001, "keep": "range sign"}`, or null for the defaults. It
+// may have tolerance, max_error, bound ("pointwise", "rms" or {"relative": {"floor": 1}}), range ([0, 1]), missing ("mask" keeps
+// NaN, which is an error otherwise), missing_value, keep, basis, space, best_for, window, block, level, chain and memory.
 //
-// Texts end with a 0. `writer` takes a pointer.
+// It takes 512 MiB of memory besides a window of frames (usually 32) of up to 1 GiB; a larger window goes to a temporary file. Where
+// `memory` gives another number of bytes, a window goes there that takes more than a quarter of it, or a sixteenth if of doubles.
+//
+// A file of this name is an error unless `replace` is not 0. It then also gives up what is in `path` with ".part" after a run was killed:
+// `wavesplat recover` makes a file of that.
+//
+// Strings are null-terminated UTF-8. `writer` receives the new writer, or null after an error.
 int32_t wavesplat_create(const char *path,
                          const struct WavesplatFrames *frames,
                          const char *settings,
-                         bool replace,
+                         int32_t replace,
                          struct WavesplatWriter **writer);
 
 // Adds a frame: copies it, and returns as soon as the conversion can take it.
 //
-// `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. After an error
-// the file cannot be finished.
+// `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. Frames are
+// converted later, a window (usually 32) at a time: an error may be about an earlier frame. After an error the file cannot be
+// finished; call `wavesplat_finish` or `wavesplat_abandon` to free the writer.
 //
-// `samples` and `strides` reach all samples of a frame.
+// `samples` points to the first sample of the frame, and every address that the strides reach can be read.
 int32_t wavesplat_push(struct WavesplatWriter *writer,
                        const void *samples,
                        const ptrdiff_t *strides);
 
+// The voxels along x, y and z of the frames that a writer takes, and the type of their samples.
+//
+// `dims` has room for three numbers, and `sample` for one.
+int32_t wavesplat_frame(const struct WavesplatWriter *writer, size_t *dims, uint32_t *sample);
+
 // Ends a file after its last frame, waits until it is whole, and frees the writer, also after an error.
 //
-// `writer` is not used any more.
+// Do not use `writer` afterwards.
 int32_t wavesplat_finish(struct WavesplatWriter *writer);
 
 // Ends a file that shall not be finished, and frees the writer. Its finished windows stay in `path` with ".part", from which
 // `wavesplat recover` makes a file.
 //
-// `writer` is not used any more.
+// Do not use `writer` afterwards.
 void wavesplat_abandon(struct WavesplatWriter *writer);
 
 // Opens a file. `lod` is the level of detail: every 2^lod-th voxel along each axis is there, 0 for all.
 //
-// `path` ends with a 0. `file` takes a pointer.
+// `path` is null-terminated UTF-8. `file` receives the file, or null after an error.
 int32_t wavesplat_open(const char *path, uint32_t lod, struct WavesplatFile **file);
 
-// Says what is known of a file.
+// Describes a file.
 //
-// `file` is open. `info` takes the answer.
+// `file` is open. `info` receives the description.
 int32_t wavesplat_info(const struct WavesplatFile *file, struct WavesplatInfo *info);
 
 // Gives the times of `count` frames from `first` on.
 //
-// `file` is open. `times` takes `count` numbers.
+// `file` is open. `times` has room for `count` numbers.
 int32_t wavesplat_times(const struct WavesplatFile *file, size_t first, size_t count, double *times);
 
 // Gives the samples of `count` frames from `first` on, of the voxels from `start` up to but without `end` along x, y and z, or of
 // all with null: frame after frame, x fastest, little-endian. `channel` is 0, or one of the three of colours.
 //
-// `file` is open. `start` and `end` are null or three numbers. `samples` takes `bytes` bytes.
+// `file` is open. `start` and `end` are null or three numbers. `samples` has room for `bytes` bytes, which must be those of the
+// samples: frames times voxels times the bytes of a sample.
 int32_t wavesplat_read(const struct WavesplatFile *file,
                        size_t first,
                        size_t count,
@@ -187,7 +200,7 @@ int32_t wavesplat_read(const struct WavesplatFile *file,
 
 // Closes a file. Null is fine.
 //
-// `file` is not used any more.
+// Do not use `file` afterwards.
 void wavesplat_close(struct WavesplatFile *file);
 
 #ifdef __cplusplus

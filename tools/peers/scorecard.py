@@ -119,7 +119,8 @@ def table(fields):
                     times = f"{encoding:.2f} | {decoding:.2f}"
                     print(f"| {field} | {share:g} | {name} | {bits:.3f} | {ratio:.1f} | {error:.3f} | {times} |", flush=True)
             kept = [(bits, name) for name, bits, error, *_ in lines if bits is not None and error <= 1]
-            best[min(kept)[1]] = best.get(min(kept)[1], 0) + 1
+            smallest = min(kept, default=(0, "none"))[1]
+            best[smallest] = best.get(smallest, 0) + 1
     print("\nSmallest, of those that keep the bound: " + ", ".join(f"{name} {count}" for name, count in best.items()))
 
 

@@ -124,6 +124,11 @@ impl Default for OpenOptions {
 }
 
 impl OpenOptions {
+    /// Bytes of `memory` for the frames of a window. Those of doubles get less, since their blocks need more of a budget.
+    pub fn for_window(&self, sample: SampleType) -> usize {
+        if sample.size() > size_of::<f32>() { self.memory / 4 } else { self.memory }
+    }
+
     /// Without the options for headerless data.
     pub fn for_headers(&self) -> Self {
         Self { dims: None, sample: None, big_endian: false, offset: 0, ..self.clone() }

@@ -127,7 +127,7 @@ impl Series {
             ..Archive::new(first.grid(), first.shape.sample(), Some(0))
         };
         let (shape, parts, starts) = (first.shape, Vec::new(), Vec::new());
-        let (access, memory) = (options.access, options.memory / 2); // the other half is for what is decoded
+        let (access, memory) = (options.access, options.for_window(first.shape.sample()));
         let mut series = Self { archive, shape, access, memory, parts, starts, last: None };
         series.take(first);
         series

@@ -339,15 +339,17 @@ mod tests {
     use super::*;
     use wavesplat_core::base::grid::Grid;
     use wavesplat_core::base::sample::SampleType;
-    use wavesplat_core::source::Archive;
+    use wavesplat_core::source::{Archive, OpenOptions};
 
     /// Neither pipes nor packed files need a setting of memory, whatever their samples are.
     #[test]
     fn frames_of_any_samples_fit_the_usual_memory() {
-        let pipe = memory::for_reading(memory::DEFAULT) / 4;
-        for (memory, keep) in [(pipe, ""), (pipe, "range sign"), (2 * pipe, "")] {
-            for sample in SampleType::ALL {
-                for dims in [[48; 3], [50, 50, 50], [300, 200, 100], [512, 512, 4], [4096, 1, 1]] {
+        let reading = memory::for_reading(memory::DEFAULT);
+        let options = OpenOptions { memory: reading, ..OpenOptions::default() };
+        for sample in SampleType::ALL {
+            for dims in [[48; 3], [50, 50, 50], [300, 200, 100], [512, 512, 4], [4096, 1, 1]] {
+                for keep in ["", "range sign"] {
+                    let memory = options.for_window(sample);
                     let archive = Archive { memory, ..Archive::new(Grid::unit(dims), sample, None) };
                     let keep = Keep::parse(keep).expect("words");
                     let input = CodedInput::new(&ConvertConfig { keep, ..ConvertConfig::new(0.01) }, &archive);

@@ -19,9 +19,6 @@ use wavesplat_core::source::{Archive, FrameSource, FrameWindow, OpenOptions, tim
 
 const CHUNK: usize = 1 << 20; // bytes asked for at a time
 
-/// A window may take one part in this many of the memory; more go to a temporary file. The usual blocks of any samples need the rest.
-const SHARE: usize = 4;
-
 /// Frames one after another from a reader.
 pub(crate) struct Stream<R> {
     /// What messages call it.
@@ -63,7 +60,7 @@ impl<R: Read> Stream<R> {
         let mut grid = Grid::unit(shape.dims());
         override_grid(&mut grid, options);
         check_grid(&grid, options, name)?;
-        let memory = options.memory / SHARE;
+        let memory = options.for_window(shape.sample());
         let mut archive = Archive { format: "stream", memory, ..Archive::new(grid, shape.sample(), frames) };
         times::settle(&mut archive, options)?;
         let stored = Stored::plain(shape.dims(), 1, ty, big_endian).map_err(|e| Error::input(name, e))?;

@@ -38,7 +38,7 @@ int main(void) {
     };
     const ptrdiff_t strides[3] = {sizeof *now, ROW * sizeof *now, ROW * ROW * sizeof *now};
     WavesplatWriter *writer;
-    check(wavesplat_create("run.wspl", &frames, "{\"max_error\": 0.05}", true, &writer));
+    check(wavesplat_create("run.wspl", &frames, "{\"max_error\": 0.05}", 1, &writer));
     for (int n = 0; n < STEPS; n++) {
         check(wavesplat_push(writer, &now[AT(1, 1, 1)], strides));
         if (n == STEPS - 1) break;

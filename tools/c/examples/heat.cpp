@@ -14,7 +14,7 @@ static void check(int status) {
 class Writer {
 public:
     Writer(const char *path, const WavesplatFrames &frames, const char *settings) {
-        check(wavesplat_create(path, &frames, settings, true, &writer));
+        check(wavesplat_create(path, &frames, settings, 1, &writer));
     }
     Writer(const Writer &) = delete;
     Writer &operator=(const Writer &) = delete;

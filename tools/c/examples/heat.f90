@@ -15,7 +15,7 @@ program heat
         field(i, j, k) = 300 + 50 * sin(0.2d0 * i) * cos(0.15d0 * j) * sin(0.1d0 * k)
     end do
     frames = wavesplat_frames(dims=[n, n, n], sample=wavesplat_f64, time_step=0.5d0, unit=c_loc(unit))
-    call wavesplat_check(wavesplat_create("run.wspl", frames, '{"max_error": 0.05}', writer))
+    call wavesplat_check(wavesplat_create("run.wspl", frames, '{"max_error": 0.05}', .true., writer))
     do s = 1, steps
         call wavesplat_check(wavesplat_push(writer, field(1:n, 1:n, 1:n)))
         around = field(0:n - 1, 1:n, 1:n) + field(2:n + 1, 1:n, 1:n) + field(1:n, 0:n - 1, 1:n) &

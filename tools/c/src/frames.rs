@@ -4,6 +4,7 @@
 use crate::text;
 use std::ffi::c_char;
 use wavesplat::base::sample::SampleType;
+use wavesplat::source::RegularTimes;
 use wavesplat::{Error, Result};
 
 /// Unsigned integers of 8 bits.
@@ -37,7 +38,7 @@ const SAMPLES: [SampleType; 9] = [
     SampleType::F64,
 ];
 
-/// The frames of a run. Set all fields that are not needed to 0.
+/// The frames of a run: regular in space and time. Set all fields that are not needed to 0. A plane has 1 voxel along z.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct WavesplatFrames {
@@ -53,7 +54,7 @@ pub struct WavesplatFrames {
     pub first_time: f64,
     /// The time from each frame to the next; 0 if frames have no times.
     pub time_step: f64,
-    /// The unit of times, such as "s"; or null.
+    /// The unit of times, such as "s" or "hours since 2000-01-01"; or null.
     pub time_unit: *const c_char,
     /// The name of what the samples are, such as "pressure"; or null.
     pub variable: *const c_char,
@@ -68,8 +69,7 @@ pub(crate) struct Frames {
     pub(crate) sample: SampleType,
     pub(crate) spacing: [f64; 3],
     pub(crate) origin: [f64; 3],
-    /// The time of the first frame, and between frames.
-    pub(crate) times: Option<[f64; 2]>,
+    pub(crate) times: Option<RegularTimes>,
     pub(crate) time_unit: Option<String>,
     pub(crate) variable: Option<String>,
     pub(crate) unit: Option<String>,
@@ -83,7 +83,8 @@ impl Frames {
         let sample = sample.ok_or_else(|| Error::value("sample", given.sample, "is no type of samples"))?;
         // SAFETY: the caller's.
         let text = |name, text| unsafe { text::optional(name, text) }.map(|text| text.map(String::from));
-        let times = (given.time_step != 0.0).then_some([given.first_time, given.time_step]);
+        let is_timed = given.time_step != 0.0;
+        let times = is_timed.then(|| RegularTimes::new(given.first_time, given.time_step)).transpose()?;
         let frames = Self {
             dims: given.dims,
             sample,
@@ -94,16 +95,32 @@ impl Frames {
             variable: text("variable", given.variable)?,
             unit: text("unit", given.unit)?,
         };
-        frames.bytes().map(|_| frames)
+        frames.check().map(|()| frames)
     }
 
     /// Bytes of a frame.
-    pub(crate) fn bytes(&self) -> Result<usize> {
-        let voxels = self.dims.into_iter().try_fold(self.sample.size(), usize::checked_mul);
-        let bytes = voxels.filter(|bytes| (1..isize::MAX as usize).contains(bytes));
-        bytes.ok_or_else(|| Error::setting("dims", format!("{:?} voxels are none, or too many", self.dims)))
+    pub(crate) fn bytes(&self) -> usize {
+        self.dims.into_iter().product::<usize>() * self.sample.size()
+    }
+
+    fn check(&self) -> Result<()> {
+        let bytes = self.dims.into_iter().try_fold(self.sample.size(), usize::checked_mul);
+        let (setting, what) = match bytes {
+            Some(1..=MOST_BYTES) if self.spacing.iter().any(|step| !(step.is_finite() && *step > 0.0)) => {
+                ("spacing", format!("takes numbers above 0, not {:?}", self.spacing))
+            }
+            Some(1..=MOST_BYTES) if !self.origin.iter().all(|at| at.is_finite()) => {
+                ("origin", format!("takes finite numbers, not {:?}", self.origin))
+            }
+            Some(1..=MOST_BYTES) => return Ok(()),
+            _ => ("dims", format!("{:?} voxels are none, or too many", self.dims)),
+        };
+        Err(Error::setting(setting, what))
     }
 }
+
+/// Of a frame: so many can have addresses.
+const MOST_BYTES: usize = isize::MAX as usize;
 
 /// The number of a type of samples.
 pub(crate) fn number_of(sample: SampleType) -> u32 {

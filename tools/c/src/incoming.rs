@@ -1,9 +1,12 @@
-//! Frames on their way from the caller to a conversion, as a stream of bytes.
+//! Frames on their way from the caller to a conversion: as a stream of bytes, or by windows in memory.
 
+use crate::frames::Frames;
 use std::io::{self, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use wavesplat::source::{Archive, FrameSource, FrameWindow};
+use wavesplat::{Error, Grid, Region, Result};
 
 /// Frames that wait: while one is taken, the next one is copied.
 const WAITING: usize = 1;
@@ -49,20 +52,104 @@ impl Outgoing {
     }
 }
 
+impl Incoming {
+    /// The next frame; none after the last one.
+    fn next(&self) -> io::Result<Option<Vec<u8>>> {
+        match self.frames.recv() {
+            Ok(frame) => Ok(Some(frame)),
+            Err(_) if self.is_abandoned.load(Ordering::SeqCst) => Err(io::Error::other("was abandoned")),
+            Err(_) => Ok(None),
+        }
+    }
+}
+
 impl Read for Incoming {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.current.len() {
             let _ = self.spare.send(std::mem::take(&mut self.current)); // nobody may want it any more
             self.at = 0;
-            match self.frames.recv() {
-                Ok(frame) => self.current = frame,
-                Err(_) if self.is_abandoned.load(Ordering::SeqCst) => return Err(io::Error::other("was abandoned")),
-                Err(_) => return Ok(0),
-            }
+            self.current = self.next()?.unwrap_or_default();
         }
         let count = out.len().min(self.current.len() - self.at);
         out[..count].copy_from_slice(&self.current[self.at..][..count]);
         self.at += count;
         Ok(count)
+    }
+}
+
+/// Frames whose windows are in memory.
+pub(crate) struct InMemory {
+    archive: Archive,
+    incoming: Incoming,
+    /// The number of the next frame.
+    next: usize,
+}
+
+impl InMemory {
+    /// `memory` is what a window takes.
+    pub(crate) fn new(incoming: Incoming, of: &Frames, memory: usize) -> Self {
+        let grid = Grid { dims: of.dims, spacing: of.spacing, origin: of.origin };
+        let mut archive = Archive { memory, regular_times: of.times, ..Archive::new(grid, of.sample, None) };
+        (archive.format, archive.units.times) = ("stream", of.time_unit.clone());
+        Self { archive, incoming, next: 0 }
+    }
+}
+
+impl FrameSource for InMemory {
+    fn archive(&self) -> &Archive {
+        &self.archive
+    }
+
+    fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
+        let mut frames = Vec::new();
+        while self.next < first + count {
+            let Some(frame) = self.incoming.next().map_err(|e| Error::io("frames", "receiving", e))? else { break };
+            if self.next >= first {
+                frames.push(frame);
+            }
+            self.next += 1;
+        }
+        let (grid, size, spare) = (self.archive.grid, self.archive.sample.size(), self.incoming.spare.clone());
+        Ok(Box::new(Window { frames, first, grid, size, spare }))
+    }
+}
+
+/// Some frames, whose memory goes back to the caller's end.
+struct Window {
+    frames: Vec<Vec<u8>>,
+    first: usize,
+    grid: Grid,
+    /// Bytes of a sample.
+    size: usize,
+    spare: Sender<Vec<u8>>,
+}
+
+impl FrameWindow for Window {
+    fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
+        let (frame, whole) = (&self.frames[frame], self.grid.whole());
+        let row = (region.dims()[0] * self.size).max(1);
+        for ((y, z), out) in region.rows().zip(out.chunks_exact_mut(row)) {
+            let start = whole.index([region.start[0], y, z]) * self.size;
+            out.copy_from_slice(&frame[start..start + row]);
+        }
+        Ok(())
+    }
+
+    fn name(&self, frame: usize) -> String {
+        format!("frame {}", self.first + frame)
+    }
+
+    fn check_unchanged(&self) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl Drop for Window {
+    fn drop(&mut self) {
+        self.frames.drain(..).for_each(|frame| drop(self.spare.send(frame))); // nobody may want it any more
     }
 }

@@ -6,6 +6,7 @@
 //! Every function is safe to call from any thread, but only from one at a time for the same writer. Several threads may read the
 //! same file. No panic leaves a function, and no signal handler is installed.
 
+mod arithmetic;
 mod status;
 mod text;
 mod frames;

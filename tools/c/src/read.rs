@@ -3,8 +3,9 @@
 
 use crate::frames::number_of;
 use crate::status::answer;
-use crate::text::{pointed, pointed_mut, required};
+use crate::text::{give, pointed, required};
 use std::ffi::{c_char, c_void};
+use std::ptr::null_mut;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::extract::{ExtractConfig, extract_into};
@@ -14,7 +15,7 @@ use wavesplat::{Error, Region, Result};
 /// An open file.
 pub struct WavesplatFile(CoefficientFile);
 
-/// What is known of a file.
+/// The description of a file.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default)]
 pub struct WavesplatInfo {
@@ -41,30 +42,32 @@ pub struct WavesplatInfo {
 /// Opens a file. `lod` is the level of detail: every 2^lod-th voxel along each axis is there, 0 for all.
 ///
 /// # Safety
-/// `path` ends with a 0. `file` takes a pointer.
+/// `path` is null-terminated UTF-8. `file` receives the file, or null after an error.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wavesplat_open(path: *const c_char, lod: u32, file: *mut *mut WavesplatFile) -> i32 {
     answer(|| {
         // SAFETY: the caller's.
-        let (path, file) = unsafe { (required("path", path)?, pointed_mut("file", file)?) };
+        unsafe { give("file", file, null_mut()) }?;
+        // SAFETY: the caller's.
+        let path = unsafe { required("path", path)? };
         // A page of a map that is lost would end the host.
         let open = CoefficientFile::open_with(path, Access::Read)?.with_detail(lod)?;
-        *file = Box::into_raw(Box::new(WavesplatFile(open)));
-        Ok(())
+        // SAFETY: the caller's.
+        unsafe { give("file", file, Box::into_raw(Box::new(WavesplatFile(open)))) }
     })
 }
 
-/// Says what is known of a file.
+/// Describes a file.
 ///
 /// # Safety
-/// `file` is open. `info` takes the answer.
+/// `file` is open. `info` receives the description.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wavesplat_info(file: *const WavesplatFile, info: *mut WavesplatInfo) -> i32 {
     answer(|| {
         // SAFETY: the caller's.
-        let (WavesplatFile(file), info) = unsafe { (pointed("file", file)?, pointed_mut("info", info)?) };
+        let WavesplatFile(file) = unsafe { pointed("file", file)? };
         let metadata = file.metadata();
-        *info = WavesplatInfo {
+        let found = WavesplatInfo {
             dims: file.grid.dims,
             frames: file.frames(),
             channels: file.channels(),
@@ -75,14 +78,15 @@ pub unsafe extern "C" fn wavesplat_info(file: *const WavesplatFile, info: *mut W
             reached: metadata.windows.iter().map(|window| window.reached).fold(0.0, f64::max),
             has_times: !metadata.times.is_empty(),
         };
-        Ok(())
+        // SAFETY: the caller's.
+        unsafe { give("info", info, found) }
     })
 }
 
 /// Gives the times of `count` frames from `first` on.
 ///
 /// # Safety
-/// `file` is open. `times` takes `count` numbers.
+/// `file` is open. `times` has room for `count` numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wavesplat_times(
     file: *const WavesplatFile,
@@ -105,7 +109,8 @@ pub unsafe extern "C" fn wavesplat_times(
 /// all with null: frame after frame, x fastest, little-endian. `channel` is 0, or one of the three of colours.
 ///
 /// # Safety
-/// `file` is open. `start` and `end` are null or three numbers. `samples` takes `bytes` bytes.
+/// `file` is open. `start` and `end` are null or three numbers. `samples` has room for `bytes` bytes, which must be those of the
+/// samples: frames times voxels times the bytes of a sample.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wavesplat_read(
     file: *const WavesplatFile,
@@ -120,8 +125,11 @@ pub unsafe extern "C" fn wavesplat_read(
     answer(|| {
         // SAFETY: the caller's.
         let (WavesplatFile(file), out) = unsafe { (pointed("file", file)?, room("samples", samples.cast(), bytes)?) };
-        // SAFETY: the caller's.
-        let place = |at: *const usize, all: [usize; 3]| if at.is_null() { all } else { unsafe { *at.cast() } };
+        let place = |at: *const usize, all: [usize; 3]| {
+            let given = (!at.is_null()).then_some(at.cast::<[usize; 3]>());
+            // SAFETY: the caller's.
+            given.map_or(all, |at| unsafe { at.read_unaligned() })
+        };
         let region = Region { start: place(start, [0; 3]), end: place(end, file.grid.dims) };
         let last = first.checked_add(count).filter(|end| *end <= file.frames());
         let last = last.ok_or_else(|| Error::value("first", first, format!("and {count} more are not in the file")))?;
@@ -133,12 +141,15 @@ pub unsafe extern "C" fn wavesplat_read(
 /// Closes a file. Null is fine.
 ///
 /// # Safety
-/// `file` is not used any more.
+/// Do not use `file` afterwards.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wavesplat_close(file: *mut WavesplatFile) {
     if !file.is_null() {
-        // SAFETY: `wavesplat_open` made it by a box.
-        drop(unsafe { Box::from_raw(file) });
+        answer(|| {
+            // SAFETY: `wavesplat_open` made it by a box.
+            drop(unsafe { Box::from_raw(file) });
+            Ok(())
+        });
     }
 }
 
@@ -147,8 +158,10 @@ pub unsafe extern "C" fn wavesplat_close(file: *mut WavesplatFile) {
 /// # Safety
 /// `at` is null or points to `count` of `T` that nobody else uses for `'a`.
 unsafe fn room<'a, T>(name: &'static str, at: *mut T, count: usize) -> Result<&'a mut [T]> {
+    let bytes = count.checked_mul(size_of::<T>()).filter(|bytes| *bytes <= isize::MAX as usize);
+    if count > 0 && (at.is_null() || !at.is_aligned() || bytes.is_none()) {
+        return Err(Error::setting(name, format!("is no room for {count}")));
+    }
     // SAFETY: the caller's.
-    unsafe { pointed_mut(name, at)? };
-    // SAFETY: the caller's.
-    Ok(unsafe { std::slice::from_raw_parts_mut(at, count) })
+    Ok(if count == 0 { &mut [] } else { unsafe { std::slice::from_raw_parts_mut(at, count) } })
 }

@@ -1,6 +1,7 @@
 //! What functions return, and the message of an error.
 #![allow(unsafe_code)]
 
+use crate::arithmetic::Arithmetic;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,7 +19,7 @@ pub const WAVESPLAT_INPUT: i32 = 3;
 pub const WAVESPLAT_DAMAGED: i32 = 4;
 /// A file changed while it was open.
 pub const WAVESPLAT_CHANGED: i32 = 5;
-/// A mistake of the library. Please report it.
+/// A bug in the library. Please report it.
 pub const WAVESPLAT_BUG: i32 = 6;
 
 thread_local! {
@@ -28,7 +29,8 @@ thread_local! {
 /// What went wrong in the last call of this thread that failed, in English and UTF-8. It is valid until the next call that fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn wavesplat_message() -> *const c_char {
-    MESSAGE.with_borrow(|message| message.as_ptr())
+    let kept = MESSAGE.try_with(|message| message.borrow().as_ptr());
+    kept.unwrap_or(c"".as_ptr()) // a thread that ends has none
 }
 
 /// The version of the library, such as "0.1.0". Versions with the same first number, or 0 and the same second, fit together.
@@ -41,15 +43,16 @@ pub extern "C" fn wavesplat_version() -> *const c_char {
     VERSION.as_ptr()
 }
 
-/// Does what a function of the library is asked for. Keeps the message of an error, and of a panic.
+/// Does what a function of the library is asked for, with the usual arithmetic. Keeps the message of an error, and of a panic.
 pub(crate) fn answer(work: impl FnOnce() -> Result<()>) -> i32 {
+    let _usual = Arithmetic::usual();
     let (status, message) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return WAVESPLAT_OK,
         Ok(Err(error)) => (status_of(&error), error.to_string()),
-        Err(_) => (WAVESPLAT_BUG, "wavesplat failed by a mistake of its own; please report it".into()),
+        Err(_) => (WAVESPLAT_BUG, "this is a bug in wavesplat; please report it".into()),
     };
     let text = CString::new(message.replace('\0', "\u{fffd}")).unwrap_or_default();
-    MESSAGE.set(text);
+    let _ = MESSAGE.try_with(|message| message.replace(text)); // a thread that ends keeps none
     status
 }
 

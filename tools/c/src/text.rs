@@ -47,3 +47,16 @@ pub(crate) unsafe fn pointed_mut<'a, T>(name: &'static str, at: *mut T) -> Resul
 fn missing(name: &'static str) -> Error {
     Error::setting(name, "is null")
 }
+
+/// Gives the caller a value.
+///
+/// # Safety
+/// `at` is null, or has room for a `T`.
+pub(crate) unsafe fn give<T>(name: &'static str, at: *mut T, value: T) -> Result<()> {
+    if at.is_null() {
+        return Err(missing(name));
+    }
+    // SAFETY: the caller's.
+    unsafe { at.write_unaligned(value) };
+    Ok(())
+}

@@ -6,9 +6,8 @@ use std::path::Path;
 
 const BEGIN: &str = "/* wavesplat for C and C++: frames in from a running simulation, samples out.
  *
- * All functions but wavesplat_message, wavesplat_version, wavesplat_abandon and wavesplat_close return WAVESPLAT_OK or what went
- * wrong; then wavesplat_message says it in words. They are safe to call from any thread, but only from one at a time for the same
- * writer. Several threads may read the same file.
+ * Functions that return a number return WAVESPLAT_OK or an error code; wavesplat_message then has the reason in words. They can be
+ * called from any thread, but only from one at a time for the same writer. Several threads may read the same file.
  *
  * tools/c/tests/header.rs makes this file of the sources. */
 ";

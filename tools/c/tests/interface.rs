@@ -42,7 +42,7 @@ fn message() -> String {
 fn create(path: &Path, frames: &WavesplatFrames, settings: &str, replace: bool) -> Result<*mut WavesplatWriter, i32> {
     let (path, settings, mut writer) = (text(path), text(settings), null_mut());
     // SAFETY: all pointers are valid.
-    match unsafe { wavesplat_create(path.as_ptr(), frames, settings.as_ptr(), replace, &raw mut writer) } {
+    match unsafe { wavesplat_create(path.as_ptr(), frames, settings.as_ptr(), replace.into(), &raw mut writer) } {
         WAVESPLAT_OK => Ok(writer),
         status => Err(status),
     }
@@ -151,7 +151,12 @@ fn what_cannot_be_done_is_said() {
         (WavesplatFrames { sample: 9, ..frames() }, "{}", "sample 9"),
         (WavesplatFrames { dims: [0, 1, 1], ..frames() }, "{}", "dims"),
         (WavesplatFrames { dims: [usize::MAX, 2, 1], ..frames() }, "{}", "dims"),
+        (WavesplatFrames { spacing: [1.0, -1.0, 1.0], ..frames() }, "{}", "spacing"),
+        (WavesplatFrames { origin: [f64::NAN; 3], ..frames() }, "{}", "origin"),
+        (WavesplatFrames { time_step: -1.0, ..frames() }, "{}", "times"),
         (frames(), "{", "settings"),
+        (frames(), "[0.5]", "an object"),
+        (frames(), r#"{"shard": "1/2", "range": [0, 1]}"#, "for files of frames"),
         (frames(), r#"{"tolerence": 1}"#, "tolerence"),
         (frames(), r#"{"tolerance": 1, "max_error": 1}"#, "give one"),
     ] {
@@ -170,6 +175,8 @@ fn what_cannot_be_done_is_said() {
     assert_eq!(open(&path, 0).err(), Some(WAVESPLAT_DAMAGED));
     assert_eq!(create(&path, &frames(), "{}", false).err(), Some(WAVESPLAT_ARGUMENT));
     assert!(message().contains("exists already"), "{}", message());
+    assert_eq!(create(Path::new("/nowhere/a.wspl"), &frames(), "", true).err(), Some(WAVESPLAT_ARGUMENT));
+    assert!(message().contains("/nowhere: is no folder"), "{}", message());
 }
 
 #[test]
@@ -185,7 +192,7 @@ fn an_error_on_the_way_ends_the_file() {
     assert_eq!(push(writer, &good), WAVESPLAT_ARGUMENT);
     // SAFETY: it is used for the last time.
     assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_ARGUMENT);
-    assert!(message().contains("failed before"), "{}", message());
+    assert!(message().contains("failed before") && message().contains("missing"), "{}", message());
     assert!(!path.exists());
 }
 
@@ -198,7 +205,9 @@ fn an_abandoned_file_keeps_its_windows() {
     // SAFETY: it is used for the last time.
     unsafe { wavesplat_abandon(writer) };
     assert!(!path.exists() && part.exists());
-    let bytes = std::fs::read(part).expect("a file");
+    let bytes = std::fs::read(&part).expect("a file");
+    assert_eq!(create(&path, &frames(), "{}", false).err(), Some(WAVESPLAT_ARGUMENT));
+    assert!(message().contains("a.wspl.part: exists already"), "{}", message());
     let complete = wavesplat::format::CompletePrefix::read(&bytes).expect("windows").metadata().frames;
     assert!((4..=20).contains(&complete), "{complete}");
 }
@@ -214,4 +223,35 @@ fn the_grid_is_kept() {
     assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
     let grid = wavesplat::file::CoefficientFile::open(path).expect("a file").grid;
     assert_eq!(grid, Grid { dims: DIMS, spacing: [0.5, 1.0, 2.0], origin: [1.0, 2.0, 3.0] });
+}
+
+/// Programs flush small numbers to zero where they are built to be fast.
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn the_arithmetic_of_the_caller_does_not_matter() {
+    use std::arch::asm;
+    let set = |control: u32| {
+        // SAFETY: it loads a control register with a valid value.
+        unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const control) };
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.wspl");
+    let tiny: Vec<f32> = (0..VOXELS).map(|i| f32::from_bits(40 + 977 * i as u32)).collect();
+    set(0x1F80 | 0x8040 | 0x6000); // flushed to zero, and rounded to zero
+    let writer = create(&path, &frames(), r#"{"bound": {"relative": {"floor": 0}}, "tolerance": 0.01}"#, false);
+    let writer = writer.expect("a writer");
+    let pushed = (0..40).map(|_| push(writer, &tiny)).max();
+    // SAFETY: it is used for the last time.
+    let finished = unsafe { wavesplat_finish(writer) };
+    let file = open(&path, 0).expect("a file");
+    let mut found = vec![0_f32; VOXELS];
+    // SAFETY: `found` has room.
+    let read = unsafe { wavesplat_read(file, 39, 1, null(), null(), 0, found.as_mut_ptr().cast(), 4 * VOXELS) };
+    set(0x1F80);
+    // SAFETY: it is used for the last time.
+    unsafe { wavesplat_close(file) };
+    assert_eq!((pushed, finished, read), (Some(WAVESPLAT_OK), WAVESPLAT_OK, WAVESPLAT_OK));
+    for (found, given) in found.iter().zip(&tiny) {
+        assert!((f64::from(*found) - f64::from(*given)).abs() <= 0.01 * f64::from(*given), "{found:e} {given:e}");
+    }
 }

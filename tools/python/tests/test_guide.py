@@ -36,11 +36,11 @@ def test_zarr(folder):
     data = smooth((40, 16, 64, 64))
     ds = xr.Dataset({"thetao": (("time", "depth", "lat", "lon"), data)}, {"time": np.arange(40)})
     names = {"ds": ds}
-    for heading in ("Zarr arrays", "Files as Zarr"):
-        for block in blocks(heading):
-            exec(block, names)
+    exec(blocks("A Zarr codec")[0], names)
     assert 0 < np.abs(names["back"].thetao.values - data).max() <= 0.05
-    assert names["group"]["data"].shape == wavesplat.open("run.wspl").shape
+    ds.to_wavesplat("run.wspl", tolerance=1e-3, overwrite=True)
+    exec(blocks("Files as Zarr")[0], names)
+    assert names["group"]["thetao"].shape == data.shape
 
 
 def test_numcodecs():
@@ -54,7 +54,7 @@ def test_pyvista(folder):
     pyvista = pytest.importorskip("pyvista")
     pyvista.OFF_SCREEN = True
     exec(blocks("ParaView")[1].replace(".plot()", ""), {})
-    assert pyvista.read("part.vti").dimensions == (22, 18, 8)
+    assert pyvista.read("part.vtk").dimensions == (22, 18, 8)
 
 
 def test_paraview(folder):

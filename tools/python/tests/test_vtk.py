@@ -34,7 +34,8 @@ def show(source, time):
     image = Fetch(source)
     array = image.GetPointData().GetScalars()
     picked = [array.GetTuple1(n) for n in range(0, array.GetNumberOfTuples(), 97)]
-    print(image.GetClassName(), *image.GetDimensions(), *image.GetBounds(), array.GetName(), *picked)
+    bounds = source.GetDataInformation().GetBounds()
+    print(image.GetClassName(), *image.GetDimensions(), *bounds, array.GetName(), *picked)
 
 
 show(reader, times[7])

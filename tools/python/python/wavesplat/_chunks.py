@@ -58,10 +58,11 @@ class Chunks:
         if self.range is not None:
             plain["range"] = tuple(number("range", end) for end in pair("range", "(LO, HI)", self.range))
         if not isinstance(self.missing, str):
-            plain["missing"] = number("missing", self.missing)
-            if math.isnan(plain["missing"]):
-                plain["missing"] = "mask"
-        text("axes", self.axes)
+            value = number("missing", self.missing)
+            plain["missing"] = value if math.isfinite(value) else "mask"
+        plain["keep"] = text("keep", self.keep) or ""
+        if self.axes is not None:
+            self.letters(len(text("axes", self.axes) or ""))
         for name, value in plain.items():
             object.__setattr__(self, name, value)
         _wavesplat.check(self._request(None))
@@ -90,7 +91,7 @@ class Chunks:
         """The value that is kept besides NaN and infinities, if there is one: a file has one such value at most."""
         if self.missing == "error" or fill is None or not fill or np.isnan(fill):
             return self.missing
-        if self.missing not in ("mask", float(fill)):
+        if self.missing != "mask" and fill != np.asarray(self.missing, np.asarray(fill).dtype):
             raise ValueError(
                 f"missing: is {self.missing}, but the fill value of the array is {fill}; let both be the same"
             )
@@ -120,12 +121,14 @@ class Chunks:
     def encoded(self, samples: Array, fill: Any = None) -> bytes:
         """The streams of a chunk of an array with a fill value, if it has one."""
         request = self._request(fill)
+        if samples.size == 0:
+            return b""
         return b"".join(_stream(_without_end(run, fill), request) for run in self._runs(samples))
 
     def decode_into(self, samples: Array, stored: bytes) -> None:
         """Reads a chunk. What the streams leave out stays as it is."""
         sample, at = sample_of(samples.dtype), 0
-        for run in self._runs(samples):
+        for run in self._runs(samples) if samples.size else ():
             found, (x, y, z, frames), at = _wavesplat.decode(stored, at, run.shape[::-1], sample)
             run[:frames, :z, :y, :x] = found.view(_little_endian(sample)).reshape(frames, z, y, x)
         if at != len(stored):

@@ -30,6 +30,10 @@ class Wavesplat(Codec):  # type: ignore[misc]
     def get_config(self) -> dict[str, Any]:  # noqa: D102
         return {"id": self.codec_id, **self._chunks.configuration()}
 
+    def __repr__(self) -> str:  # noqa: D105
+        settings = ", ".join(f"{name}={value!r}" for name, value in self._chunks.configuration().items())
+        return f"Wavesplat({settings})"
+
     def encode(self, buf: Any) -> bytes:  # noqa: D102
         samples = np.asarray(buf)
         sample_of(samples.dtype)
@@ -42,7 +46,8 @@ class Wavesplat(Codec):  # type: ignore[misc]
         try:
             about = json.loads(stored[_LENGTH:end])
             samples = np.empty(about["shape"], about["dtype"])
-        except (KeyError, TypeError, ValueError) as why:
+            sample_of(samples.dtype)
+        except (KeyError, MemoryError, RecursionError, TypeError, ValueError) as why:
             raise _wavesplat.DamagedError(f"a chunk: its shape and type cannot be read: {why}") from None
         self._chunks.decode_into(samples, stored[end:])
         return samples if out is None else ndarray_copy(samples, out)

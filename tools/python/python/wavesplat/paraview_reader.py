@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from paraview.util.vtkAlgorithm import VTKPythonAlgorithmBase, smdomain, smhint, smproperty, smproxy
 from vtkmodules.numpy_interface import dataset_adapter
-from vtkmodules.util.numpy_support import numpy_to_volumes
+from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkImageData, vtkRectilinearGrid
 from vtkmodules.vtkCommonExecutionModel import vtkAlgorithm, vtkStreamingDemandDrivenPipeline
 
@@ -99,7 +99,7 @@ class WavesplatReader(VTKPythonAlgorithmBase):
             output.SetOrigin(corner(where))
         else:
             for axis, part, along in zip("XYZ", (x, y, z), where, strict=True):
-                getattr(output, f"Set{axis}Coordinates")(numpy_to_volumes(along[part], deep=True))
+                getattr(output, f"Set{axis}Coordinates")(numpy_to_vtk(along[part], deep=True))
         output.GetInformation().Set(vtkDataObject.DATA_TIME_STEP(), when[frame])
         for called, samples in arrays(file, frame, (z, y, x)):
             dataset_adapter.WrapDataObject(output).PointData.append(samples, called)
