@@ -215,3 +215,43 @@ def test_sizes_of_pictures(file):
     for size, kind in ((512, ValueError), ((1, 2, 3), ValueError), ((5.5, 4), TypeError)):
         with pytest.raises(kind, match="^size: takes"):
             file.render(size=size)
+
+
+class OnDevice:
+    """An array as those of CuPy are: numpy cannot convert it."""
+
+    def __init__(self, array):
+        self.array, self.shape, self.dtype = array, array.shape, array.dtype
+
+    def __getitem__(self, key):
+        return OnDevice(self.array[key])
+
+    def __array__(self, *_):
+        raise TypeError("use get()")
+
+    def get(self):
+        return self.array
+
+
+class ByDlpack:
+    """An array that others know by DLPack alone."""
+
+    def __init__(self, array):
+        self.array, self.shape, self.dtype = array, array.shape, f"mine.{array.dtype}"
+
+    def __getitem__(self, key):
+        return ByDlpack(self.array[key])
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__()
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+@pytest.mark.parametrize("kind", [OnDevice, ByDlpack])
+def test_arrays_of_devices_and_of_dlpack(tmp_path, small, kind):
+    wavesplat.convert(kind(small), tmp_path / "a.wspl", tolerance=0)
+    np.testing.assert_array_equal(back(tmp_path / "a.wspl"), small)
+    wavesplat.convert((kind(frame) for frame in small), tmp_path / "b.wspl", tolerance=0)
+    np.testing.assert_array_equal(back(tmp_path / "b.wspl"), small)

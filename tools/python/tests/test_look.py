@@ -1,6 +1,7 @@
 """Pictures, figures and the viewer."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -154,3 +155,16 @@ def test_frames_by_masks_and_views_by_lists(file):
     several = file.render(view=[(30, 30), "top"], frames=[1, 2, 3], size=(20, 24))
     assert several.shape == (2, 3, 24, 20)
     assert file.render(orbit=4, frames=0, size=(20, 24)).shape == (4, 1, 24, 20)
+
+
+def test_every_option_of_pictures_has_a_type():
+    found, heading = set(), ""
+    for line in run("--help", name="wavesplat-render").splitlines():
+        heading = line.rstrip(":") if re.fullmatch(r"\w[\w ]*:", line) else heading
+        option = re.match(r"\s+(?:-\w, )?--([a-z-]+)", line)
+        if option and heading not in ("Options", "Parts", "Remote files", "Examples"):
+            found.add((heading, option[1].replace("-", "_")))
+    typed = wavesplat.PictureOptions.__optional_keys__
+    assert typed <= {name for _, name in found}
+    of_inputs = {name for heading, name in found if heading in ("Input", "Common options")}
+    assert {name for _, name in found} - typed - of_inputs == {"output", "force", "format"}

@@ -16,6 +16,7 @@ import sys as _sys
 from ._convert import convert, merge
 from ._figure import Figure
 from ._file import File, open
+from ._typed import LookOptions, PictureOptions
 from ._viewer import Viewer
 from ._wavesplat import (
     BoundMissedError,
@@ -40,6 +41,8 @@ __all__ = [
     "Figure",
     "File",
     "InputError",
+    "LookOptions",
+    "PictureOptions",
     "UnsupportedError",
     "Viewer",
     "WavesplatError",

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,11 @@ from ._options import request
 from ._pictures import pictures
 from ._progress import Progress, reporting
 from ._viewer import Viewer
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._typed import LookOptions, PictureOptions
 
 CACHE = 512 << 20
 """Bytes of decoded blocks that an open file keeps."""
@@ -351,12 +356,12 @@ class File:
         with reporting(progress, "check") as report:
             self._file.check(report)
 
-    def render(self, *, progress: Progress = False, **options: Any) -> npt.NDArray[Any]:
+    def render(self, *, progress: Progress = False, **options: Unpack[PictureOptions]) -> npt.NDArray[Any]:
         """Pictures as numbers.
 
         Args:
             progress: Whether to show progress, or a function of (done, all).
-            options: Those of ``wavesplat-render`` for pictures, with underscores: ``view=(30, 30)``, ``mode="composite"``,
+            options: `wavesplat.PictureOptions`, as in ``wavesplat-render``: ``view=(30, 30)``, ``mode="composite"``,
                 ``frames=slice(0, 8)``, ``size=(640, 480)``, ``range=(0, 1)``, ``iso="50%"``,
                 ``slice={"z": "50%"}`` (numbers are coordinates), ``colormap="RdBu"`` (names and objects of matplotlib work),
                 ``memory="1GiB"`` and so on.
@@ -372,7 +377,8 @@ class File:
             ValueError: An option is wrong.
 
         """
-        return pictures(options, lambda output: self._render(output, options, progress))
+        given: dict[str, Any] = {**options}
+        return pictures(given, lambda output: self._render(output, given, progress))
 
     def figure(
         self,
@@ -381,7 +387,7 @@ class File:
         interactive: bool = False,
         height: int = 700,
         progress: Progress = False,
-        **options: Any,
+        **options: Unpack[PictureOptions],
     ) -> Figure:
         """A picture that a notebook shows.
 
@@ -395,23 +401,24 @@ class File:
             options: As for `render`. ``annotate`` is True by default.
 
         """
+        given: dict[str, Any] = {**options}
         if interactive and format == "html":
-            return self._page(height, options)
+            return self._page(height, given)
         if interactive:
             raise ValueError(f"interactive: takes the format 'html', not {format!r}")
         if format not in ("html", "png", "apng", "gif"):
             raise ValueError(f"format: 'html', 'png', 'apng' or 'gif', not {format!r}")
-        options = {"annotate": True, **options}
+        given = {"annotate": True, **given}
         if format == "png":
-            options.setdefault("frames", self.shape[0] // 2)
-            several = (not isinstance(options["frames"], (int, np.integer)), isinstance(options.get("view"), list))
+            given.setdefault("frames", self.shape[0] // 2)
+            several = (not isinstance(given["frames"], (int, np.integer)), isinstance(given.get("view"), list))
             if all(several):
                 raise ValueError("png: shows several frames or several views, not both; take 'html'")
             if any(several):
-                options["format"] = "sheet"  # all pictures in one
+                given["format"] = "sheet"  # all pictures in one
         with tempfile.TemporaryDirectory(prefix="wavesplat-") as folder:
             path = Path(folder, f"figure.{format}")
-            self._render(str(path), options, progress)
+            self._render(str(path), given, progress)
             return Figure(path.read_bytes(), format, height)
 
     def _page(self, height: int, options: dict[str, Any]) -> Figure:
@@ -427,7 +434,9 @@ class File:
         with reporting(progress, "render") as report:
             self._file.render(request(options), output, memory, report)
 
-    def view(self, *, browser: bool = True, port: int = 0, memory: int = MEMORY, **options: Any) -> Viewer:
+    def view(
+        self, *, browser: bool = True, port: int = 0, memory: int = MEMORY, **options: Unpack[LookOptions]
+    ) -> Viewer:
         """Opens the interactive viewer in the browser.
 
         Args:
@@ -439,7 +448,7 @@ class File:
         """
         if not 0 <= whole("port", port) < 1 << 16:
             raise ValueError(f"port: takes 0 to 65535, not {port}")
-        return Viewer(self._file.view(request(options), port, str(memory)), browser=browser)
+        return Viewer(self._file.view(request({**options}), port, str(memory)), browser=browser)
 
     def to_pyvista(self, frame: int = 0, z: Any = slice(None), y: Any = slice(None), x: Any = slice(None)) -> Any:
         """A frame, or a box of it, as a data set of PyVista: an ImageData, or a RectilinearGrid where distances differ.

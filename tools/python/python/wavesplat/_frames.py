@@ -65,7 +65,7 @@ class Frames:
         first = next(iterator, None)
         if first is None:
             raise _wavesplat.InputError("source: is empty")
-        like = np.asarray(first)
+        like = _array(first)
         if like.ndim not in (2, 3) or 0 in like.shape:
             raise ValueError(f"source: frames are arrays (z, y, x) or (y, x), not of shape {like.shape}")
         each = enumerate(chain([first], iterator))
@@ -86,8 +86,14 @@ def _dtype(array: Any) -> np.dtype[Any]:
 
 
 def _array(given: Any) -> npt.NDArray[Any]:
-    """An array, perhaps with a mask."""
-    return given if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
+    """An array, perhaps with a mask. Arrays on other devices come by ``get()``, and those of other libraries by DLPack."""
+    if isinstance(given, np.ma.MaskedArray):
+        return given
+    if callable(getattr(given, "get", None)):
+        given = given.get()
+    if not hasattr(given, "__array__") and hasattr(given, "__dlpack__"):
+        return np.from_dlpack(given)
+    return np.asarray(given)
 
 
 def _key(dtype: np.dtype[Any]) -> str:
@@ -132,7 +138,7 @@ class _Part:
 
     def bytes(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> npt.NDArray[np.uint8]:
         """Their bytes, x fastest. ``shape`` and ``dtype`` are those of the frames before."""
-        array = np.asarray(self._unmasked())
+        array = _array(self._unmasked())
         if (array.shape[1:], array.dtype) != (shape, dtype):
             what = f"frame {self.start} is {array.dtype} of shape {array.shape[1:]}"
             raise _wavesplat.InputError(f"source: {what}, but the first one is {dtype} of shape {shape}")

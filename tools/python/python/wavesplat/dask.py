@@ -11,7 +11,7 @@ import uuid
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,11 @@ from ._convert import merge
 from ._file import anywhere
 from ._file import open as _open
 from ._pictures import pictures, run
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._typed import PictureOptions
 
 CHAIN = 256
 """Frames of a chain by default: 8 windows of 32 frames."""
@@ -134,7 +139,7 @@ def render(
     client: Any = None,
     regions: int | Sequence[str] | None = None,
     folder: str | PathLike[str] | None = None,
-    **options: Any,
+    **options: Unpack[PictureOptions],
 ) -> npt.NDArray[Any]:
     """Pictures as numbers by many workers, as `wavesplat.File.render` gives them.
 
@@ -161,21 +166,22 @@ def render(
     import distributed
 
     client = client or distributed.get_client()
+    given: dict[str, Any] = {**options}
     paths = [source] if isinstance(source, (str, PathLike)) else list(source)
     files = [anywhere(os.fspath(path)) for path in paths]
     if not files:
         raise ValueError("source: takes a file, or several")
     if regions is None and len(files) == 1:
-        return _divided(client, files[0], options)
-    if options.get("region") is not None and regions is not None:
+        return _divided(client, files[0], given)
+    if given.get("region") is not None and regions is not None:
         raise ValueError("region: cannot be given with regions")
-    boxes = [options.pop("region", None)] if regions is None else _boxes(files[0], regions)
+    boxes = [given.pop("region", None)] if regions is None else _boxes(files[0], regions)
     place = Path(folder) if folder is not None else Path(files[0] + ".parts")
     own = place / uuid.uuid4().hex
     own.mkdir(parents=True)
     try:
-        of_part = {name: value for name, value in options.items() if name not in OF_SUMS}
-        of_sum = {name: value for name, value in options.items() if name in OF_SUMS + OF_BOTH}
+        of_part = {name: value for name, value in given.items() if name not in OF_SUMS}
+        of_sum = {name: value for name, value in given.items() if name in OF_SUMS + OF_BOTH}
         jobs = [(file, {**of_part, "region": box}) for file in files for box in boxes]
         names = [str(own / f"part-{n}.wpart") for n in range(len(jobs))]
         parts = client.map(_part, jobs, names, pure=False)
@@ -187,7 +193,7 @@ def render(
             pairs = zip(groups, names, strict=True)
             parts = [client.submit(_joined, group, name, limits, pure=False) for group, name in pairs]
             level += 1
-        total: npt.NDArray[Any] = client.submit(_total, parts, of_sum, options, pure=False).result()
+        total: npt.NDArray[Any] = client.submit(_total, parts, of_sum, given, pure=False).result()
         return total
     finally:
         shutil.rmtree(own, ignore_errors=True)
