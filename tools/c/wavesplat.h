@@ -1,7 +1,8 @@
 /* wavesplat for C and C++: frames in from a running simulation, samples out.
  *
  * Functions that return a number return WAVESPLAT_OK or an error code; wavesplat_message then has the reason in words. They can be
- * called from any thread, but only from one at a time for the same writer. Several threads may read the same file.
+ * called from any thread, but only from one at a time for the same writer. Several threads may read the same file. A process that was
+ * forked after the library was used cannot use it.
  *
  * tools/c/tests/header.rs makes this file of the sources. */
 

@@ -4,8 +4,8 @@
 use crate::text;
 use std::ffi::c_char;
 use wavesplat::base::sample::SampleType;
-use wavesplat::source::RegularTimes;
-use wavesplat::{Error, Result};
+use wavesplat::source::{Archive, RegularTimes};
+use wavesplat::{Error, Grid, Result};
 
 /// Unsigned integers of 8 bits.
 pub const WAVESPLAT_U8: u32 = 0;
@@ -96,6 +96,15 @@ impl Frames {
             unit: text("unit", given.unit)?,
         };
         frames.check().map(|()| frames)
+    }
+
+    /// Their description.
+    pub(crate) fn archive(&self) -> Archive {
+        let grid = Grid { dims: self.dims, spacing: self.spacing, origin: self.origin };
+        let mut archive = Archive { regular_times: self.times, ..Archive::new(grid, self.sample, None) };
+        (archive.variable, archive.units.samples) = (self.variable.clone(), self.unit.clone());
+        archive.units.times = self.times.and(self.time_unit.clone());
+        archive
     }
 
     /// Bytes of a frame.

@@ -88,10 +88,7 @@ pub(crate) struct InMemory {
 impl InMemory {
     /// `memory` is what a window takes.
     pub(crate) fn new(incoming: Incoming, of: &Frames, memory: usize) -> Self {
-        let grid = Grid { dims: of.dims, spacing: of.spacing, origin: of.origin };
-        let mut archive = Archive { memory, regular_times: of.times, ..Archive::new(grid, of.sample, None) };
-        (archive.format, archive.units.times) = ("stream", of.time_unit.clone());
-        Self { archive, incoming, next: 0 }
+        Self { archive: Archive { memory, ..of.archive() }, incoming, next: 0 }
     }
 }
 
@@ -101,6 +98,9 @@ impl FrameSource for InMemory {
     }
 
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
+        if first < self.next {
+            return Err(Error::setting("frames", format!("frame {first} is over, and frame {} comes next", self.next)));
+        }
         let mut frames = Vec::new();
         while self.next < first + count {
             let Some(frame) = self.incoming.next().map_err(|e| Error::io("frames", "receiving", e))? else { break };

@@ -5,6 +5,7 @@ use crate::arithmetic::Arithmetic;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
 use wavesplat::{Error, Result};
 
 /// Success.
@@ -46,7 +47,8 @@ pub extern "C" fn wavesplat_version() -> *const c_char {
 /// Does what a function of the library is asked for, with the usual arithmetic. Keeps the message of an error, and of a panic.
 pub(crate) fn answer(work: impl FnOnce() -> Result<()>) -> i32 {
     let _usual = Arithmetic::usual();
-    let (status, message) = match catch_unwind(AssertUnwindSafe(work)) {
+    let work = AssertUnwindSafe(|| check_process().and_then(|()| work()));
+    let (status, message) = match catch_unwind(work) {
         Ok(Ok(())) => return WAVESPLAT_OK,
         Ok(Err(error)) => (status_of(&error), error.to_string()),
         Err(_) => (WAVESPLAT_BUG, "this is a bug in wavesplat; please report it".into()),
@@ -54,6 +56,15 @@ pub(crate) fn answer(work: impl FnOnce() -> Result<()>) -> i32 {
     let text = CString::new(message.replace('\0', "\u{fffd}")).unwrap_or_default();
     let _ = MESSAGE.try_with(|message| message.replace(text)); // a thread that ends keeps none
     status
+}
+
+/// An error in a process that was forked after the library was used: its threads did not follow, and waiting for them takes for ever.
+fn check_process() -> Result<()> {
+    static FIRST: OnceLock<u32> = OnceLock::new();
+    match *FIRST.get_or_init(std::process::id) == std::process::id() {
+        true => Ok(()),
+        false => Err(Error::setting("process", "was forked after wavesplat was used, and cannot use it")),
+    }
 }
 
 fn status_of(error: &Error) -> i32 {

@@ -26,8 +26,6 @@ pub struct WavesplatWriter {
     running: Option<Running>,
     /// That error.
     failure: String,
-    /// The process that began it: threads do not follow a fork.
-    process: u32,
 }
 
 struct Running {
@@ -156,8 +154,8 @@ impl WavesplatWriter {
         let conversion = move || convert(incoming, &of, request, &to, replace);
         let conversion = Builder::new().name("wavesplat".into()).spawn(conversion);
         let conversion = conversion.map_err(|e| Error::io(&path, "starting a thread", e))?;
-        let (running, process) = (Some(Running { outgoing, conversion }), std::process::id());
-        Ok(Self { frames, path, running, failure: String::new(), process })
+        let running = Some(Running { outgoing, conversion });
+        Ok(Self { frames, path, running, failure: "by a bug in wavesplat".into() })
     }
 
     /// Gives the conversion a frame that `fill` writes.
@@ -181,10 +179,7 @@ impl WavesplatWriter {
 
     fn running(&self) -> Result<&Running> {
         let failed = || Error::path(&self.path, format!("failed before: {}", self.failure));
-        match self.process == std::process::id() {
-            true => self.running.as_ref().ok_or_else(failed),
-            false => Err(Error::path(&self.path, "is written by the process that this one was forked from")),
-        }
+        self.running.as_ref().ok_or_else(failed)
     }
 
     /// Waits for the end of the conversion.
@@ -219,6 +214,9 @@ fn check_place(path: &Path, replace: bool) -> Result<()> {
     if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
         return Err(Error::path(folder, "is no folder"));
     }
+    if path.is_dir() || path.file_name().is_none() {
+        return Err(Error::path(path, "is a folder"));
+    }
     for taken in [path.into(), PathBuf::from(format!("{}.part", path.display()))] {
         if !replace && taken.exists() {
             return Err(Error::path(taken, "exists already; `replace` replaces it"));
@@ -249,7 +247,8 @@ unsafe fn copy(frames: &Frames, first: *const u8, strides: Option<[isize; 3]>, o
 }
 
 fn convert(incoming: Incoming, of: &Frames, mut request: ConvertRequest, path: &Path, replace: bool) -> Result<()> {
-    let window = (request.window.unwrap_or(USUAL_WINDOW) + AT_ONCE).saturating_mul(of.bytes());
+    let frames = request.config(&of.archive())?.window.saturating_add(AT_ONCE);
+    let window = frames.saturating_mul(of.bytes());
     let is_usual = request.memory == memory::DEFAULT && window <= MOST_IN_MEMORY && cfg!(target_endian = "little");
     if is_usual {
         request.memory += window;
@@ -272,15 +271,13 @@ fn streamed(incoming: Incoming, of: &Frames, memory: usize) -> Result<Box<dyn Fr
         spacing: Some(of.spacing),
         origin: Some(of.origin),
         times: of.times.map(GivenTimes::Regular),
-        time_unit: of.time_unit.clone(),
+        time_unit: of.times.and(of.time_unit.clone()),
         memory,
         ..OpenOptions::default()
     };
     formats::open_named_stream("frames", incoming, &options)
 }
 
-/// Frames of a window, unless there are few voxels.
-const USUAL_WINDOW: usize = 32;
 /// Frames that are in memory besides a window: one is filled, one waits, and one is taken.
 const AT_ONCE: usize = 3;
 /// Bytes of a window that are taken besides the usual memory.

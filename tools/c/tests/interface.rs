@@ -177,6 +177,8 @@ fn what_cannot_be_done_is_said() {
     assert!(message().contains("exists already"), "{}", message());
     assert_eq!(create(Path::new("/nowhere/a.wspl"), &frames(), "", true).err(), Some(WAVESPLAT_ARGUMENT));
     assert!(message().contains("/nowhere: is no folder"), "{}", message());
+    assert_eq!(create(folder.path(), &frames(), "", true).err(), Some(WAVESPLAT_ARGUMENT));
+    assert!(message().contains("is a folder"), "{}", message());
 }
 
 #[test]

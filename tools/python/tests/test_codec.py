@@ -129,6 +129,8 @@ def test_one_value_is_kept_besides_nan():
     wide[wide == 7] = 1e20
     found = stored(wide, wide.shape, WavesplatCodec(max_error=0.01, missing=1e20), fill_value=1e20)
     np.testing.assert_array_equal(found == wide.max(), wide == wide.max())
+    with pytest.raises(ValueError, match="missing: is -1.0, but the fill value of the array is 255"):
+        stored(np.ones((4, 4), "u1"), (4, 4), WavesplatCodec(max_error=1, missing=-1), fill_value=255)
     with pytest.raises(ValueError, match="missing: is -9999.0, but the fill value of the array is 7"):
         stored(samples, samples.shape, WavesplatCodec(tolerance=0.01, missing=-9999), fill_value=7)
 
@@ -266,12 +268,17 @@ def test_numcodecs_has_a_codec_too():
     relative = numcodecs.get_codec({"id": "wavesplat", "bound": "relative", "tolerance": 0.01})
     found = relative.decode(relative.encode(samples))
     assert (np.abs(found - samples) <= 0.01 * np.abs(samples)).all()
+    streams = stored[4 + int.from_bytes(stored[:4], "little") :]
     empty = np.empty((0, 4), "f4")
     assert codec.decode(codec.encode(empty)).shape == (0, 4)
     huge = b'{"shape": [1048576, 1048576], "dtype": "<f4"}'
     nested = b"[" * 100_000
+    other = [
+        json.dumps({"shape": shape, "dtype": dtype}).encode()
+        for shape, dtype in [((2, 9, 5, 8, 9), "<f4"), ((2, 8, 5, 8, 9), "<f8")]
+    ]
     lying = [
-        len(text).to_bytes(4, "little") + text + stored[40:] for text in (huge, nested, huge.replace(b"<f4", b"O"))
+        len(text).to_bytes(4, "little") + text + streams for text in (huge, nested, *other, huge.replace(b"<f4", b"O"))
     ]
     for damaged in (*lying, b"", stored[:20], stored[:-1], stored + b"x", stored[:4] + b"x" + stored[5:]):
         with pytest.raises(wavesplat.DamagedError):

@@ -49,6 +49,8 @@ class Chunks:
         """Numbers and texts as JSON has them, and a check of all."""
         if self.tolerance is None and self.max_error is None:
             raise ValueError("tolerance: give this or max_error; 0 keeps every bit")
+        if not 0 <= number("floor", self.floor) <= sys.float_info.max:
+            raise ValueError(f"floor: takes 0 or more, not {self.floor}")
         plain: dict[str, Any] = {"floor": number("floor", self.floor), "level": whole("level", self.level)}
         for name, most in ("tolerance", 1.0), ("max_error", sys.float_info.max):
             given = getattr(self, name)
@@ -91,7 +93,7 @@ class Chunks:
         """The value that is kept besides NaN and infinities, if there is one: a file has one such value at most."""
         if self.missing == "error" or fill is None or not fill or np.isnan(fill):
             return self.missing
-        if self.missing != "mask" and fill != np.asarray(self.missing, np.asarray(fill).dtype):
+        if self.missing != "mask" and not _is_same(self.missing, np.asarray(fill)):
             raise ValueError(
                 f"missing: is {self.missing}, but the fill value of the array is {fill}; let both be the same"
             )
@@ -125,14 +127,22 @@ class Chunks:
             return b""
         return b"".join(_stream(_without_end(run, fill), request) for run in self._runs(samples))
 
-    def decode_into(self, samples: Array, stored: bytes) -> None:
-        """Reads a chunk. What the streams leave out stays as it is."""
+    def decode_into(self, samples: Array, stored: bytes, *, is_whole: bool = False) -> None:
+        """Reads a chunk. What the streams leave out stays as it is, unless all must be there."""
         sample, at = sample_of(samples.dtype), 0
         for run in self._runs(samples) if samples.size else ():
             found, (x, y, z, frames), at = _wavesplat.decode(stored, at, run.shape[::-1], sample)
+            if is_whole and (x, y, z, frames) != run.shape[::-1]:
+                raise _wavesplat.DamagedError(f"a chunk: has {frames, z, y, x} samples instead of {run.shape}")
             run[:frames, :z, :y, :x] = found.view(_little_endian(sample)).reshape(frames, z, y, x)
         if at != len(stored):
             raise _wavesplat.DamagedError(f"a chunk: {len(stored) - at} bytes too many")
+
+
+def _is_same(missing: Any, fill: Array) -> bool:
+    """Whether a number is the fill value, as the samples have it."""
+    with np.errstate(over="ignore"):
+        return missing == float(fill) or (fill.dtype.kind == "f" and fill == fill.dtype.type(missing))
 
 
 def _stream(run: Array, request: str) -> bytes:

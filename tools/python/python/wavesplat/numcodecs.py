@@ -49,5 +49,8 @@ class Wavesplat(Codec):  # type: ignore[misc]
             sample_of(samples.dtype)
         except (KeyError, MemoryError, RecursionError, TypeError, ValueError) as why:
             raise _wavesplat.DamagedError(f"a chunk: its shape and type cannot be read: {why}") from None
-        self._chunks.decode_into(samples, stored[end:])
+        try:
+            self._chunks.decode_into(samples, stored[end:], is_whole=True)
+        except _wavesplat.InputError as why:
+            raise _wavesplat.DamagedError(str(why)) from None
         return samples if out is None else ndarray_copy(samples, out)
