@@ -26,18 +26,6 @@ pub const WAVESPLAT_F32: u32 = 7;
 /// Floats of 64 bits.
 pub const WAVESPLAT_F64: u32 = 8;
 
-const SAMPLES: [SampleType; 9] = [
-    SampleType::U8,
-    SampleType::I8,
-    SampleType::U16,
-    SampleType::I16,
-    SampleType::U32,
-    SampleType::I32,
-    SampleType::F16,
-    SampleType::F32,
-    SampleType::F64,
-];
-
 /// The frames of a run: regular in space and time. Set all fields that are not needed to 0. A plane has 1 voxel along z.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -79,7 +67,7 @@ impl Frames {
     /// # Safety
     /// The texts of `given` are null or end with a 0.
     pub(crate) unsafe fn new(given: &WavesplatFrames) -> Result<Self> {
-        let sample = SAMPLES.get(given.sample as usize).copied();
+        let sample = SampleType::ALL.get(given.sample as usize).copied();
         let sample = sample.ok_or_else(|| Error::value("sample", given.sample, "is no type of samples"))?;
         // SAFETY: the caller's.
         let text = |name, text| unsafe { text::optional(name, text) }.map(|text| text.map(String::from));
@@ -133,5 +121,5 @@ const MOST_BYTES: usize = isize::MAX as usize;
 
 /// The number of a type of samples.
 pub(crate) fn number_of(sample: SampleType) -> u32 {
-    SAMPLES.iter().position(|known| *known == sample).unwrap_or_default() as u32
+    SampleType::ALL.iter().position(|known| *known == sample).unwrap_or_default() as u32
 }
