@@ -26,6 +26,7 @@ for library in ("OMP", "OPENBLAS", "MKL", "RAYON"):
 import numcodecs
 import numpy as np
 from coders import CODERS
+from peers import in_child
 
 SHARES = (1e-2, 1e-3, 1e-4)
 OURS = "wavesplat"
@@ -75,7 +76,8 @@ def coded_by_us(samples, bound):
 
 
 def coded_by(peer, samples, bound):
-    series = filled(samples).reshape((-1,) + samples.shape[-3:])  # others take (time, z, y, x)
+    levels = samples.shape[-3:] if samples.shape[-3] > 1 else samples.shape[-2:]
+    series = filled(samples).reshape((-1,) + levels)  # others take (time, z, y, x), or (time, y, x)
     coder = CODERS[peer]
     blobs, encoding = timed(lambda: coder.encode(series, bound))
     decoded, decoding = timed(lambda: coder.decode(blobs, series.shape, series.dtype))
@@ -87,19 +89,13 @@ def timed(work):
     return work(), time.process_time() - started
 
 
-def judged(samples, share):
-    """A line for each coder: its name, bits of a sample, the largest error as a share of the bound, and seconds."""
+def judged(name, samples, share):
+    """Bits of a sample, the largest error as a share of the bound, and seconds; None where a coder fails."""
     present = np.isfinite(samples)
     bound = share * float(np.ptp(samples[present]))
-    for name in (OURS, *CODERS):
-        try:
-            coded = coded_by_us(samples, bound) if name == OURS else coded_by(name, samples, bound)
-        except Exception as why:  # coders raise what they like
-            yield name, None, str(why).splitlines()[0][:60], 0, 0
-            continue
-        size, decoded, encoding, decoding = coded
-        errors = np.abs(decoded[present].astype("f8") - samples[present].astype("f8"))
-        yield name, 8 * size / samples.size, errors.max() / bound, encoding, decoding
+    size, decoded, encoding, decoding = coded_by_us(samples, bound) if name == OURS else coded_by(name, samples, bound)
+    errors = np.abs(decoded[present].astype("f8") - samples[present].astype("f8"))
+    return 8 * size / samples.size, float(errors.max() / bound), encoding, decoding
 
 
 def table(fields):
@@ -110,15 +106,16 @@ def table(fields):
         samples = np.ascontiguousarray(samples if samples.dtype.kind in "iu" else samples.astype("f4"))
         samples = samples.reshape((1,) * (4 - samples.ndim) + samples.shape) if samples.ndim < 4 else samples
         for share in SHARES:
-            lines = list(judged(samples, share))
-            for name, bits, error, encoding, decoding in lines:
-                if bits is None:
-                    print(f"| {field} | {share:g} | {name} | {error} | | | | |")
-                else:
-                    ratio = 8 * samples.itemsize / bits
-                    times = f"{encoding:.2f} | {decoding:.2f}"
-                    print(f"| {field} | {share:g} | {name} | {bits:.3f} | {ratio:.1f} | {error:.3f} | {times} |", flush=True)
-            kept = [(bits, name) for name, bits, error, *_ in lines if bits is not None and error <= 1]
+            kept = []
+            for name in (OURS, *CODERS):
+                found = in_child(lambda: judged(name, samples, share))  # some coders abort
+                if found is None:
+                    print(f"| {field} | {share:g} | {name} | fails | | | | |", flush=True)
+                    continue
+                bits, error, encoding, decoding = found
+                facts = f"{bits:.3f} | {8 * samples.itemsize / bits:.1f} | {error:.3f} | {encoding:.2f} | {decoding:.2f}"
+                print(f"| {field} | {share:g} | {name} | {facts} |", flush=True)
+                kept += [(bits, name)] if error <= 1 else []
             smallest = min(kept, default=(0, "none"))[1]
             best[smallest] = best.get(smallest, 0) + 1
     print("\nSmallest, of those that keep the bound: " + ", ".join(f"{name} {count}" for name, count in best.items()))
