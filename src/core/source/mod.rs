@@ -124,9 +124,9 @@ impl Default for OpenOptions {
 }
 
 impl OpenOptions {
-    /// Bytes of `memory` for the frames of a window. Those of doubles get less, since their blocks need more of a budget.
+    /// Bytes of `memory` for the frames of a window. Those of wide samples get less, since their blocks need more of a budget.
     pub fn for_window(&self, sample: SampleType) -> usize {
-        if sample.size() > size_of::<f32>() { self.memory / 4 } else { self.memory }
+        self.memory / (sample.size() / 2).max(1)
     }
 
     /// Without the options for headerless data.

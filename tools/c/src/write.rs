@@ -41,7 +41,7 @@ struct Running {
 /// NaN, which is an error otherwise), missing_value, keep, basis, space, best_for, window, block, level, chain and memory.
 ///
 /// It takes 512 MiB of memory besides a window of frames (usually 32) of up to 1 GiB; a larger window goes to a temporary file. Where
-/// `memory` gives another number of bytes, a window goes there that takes more than a quarter of it, or a sixteenth if of doubles.
+/// `memory` gives another number of bytes, a window goes there that takes more than an eighth of it, or a sixteenth if of doubles.
 ///
 /// A file of this name is an error unless `replace` is not 0. It then also gives up what is in `path` with ".part" after a run was killed:
 /// `wavesplat recover` makes a file of that.
