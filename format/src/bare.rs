@@ -1,4 +1,4 @@
-//! A bare stream: a file without all that follows from the rest (FORMAT.md section 13). Small archives, such as chunks of an
+//! A bare stream: a file without the parts that a reader can make of the rest (FORMAT.md section 13). Small archives, such as chunks of an
 //! array, take less room as bare streams.
 
 use crate::block::{EncodedBlock, EncodedPart};

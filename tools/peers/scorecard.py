@@ -104,7 +104,7 @@ def table(fields):
     best = {}
     for field, samples in fields:
         samples = np.ascontiguousarray(samples if samples.dtype.kind in "iu" else samples.astype("f4"))
-        samples = samples.reshape((1,) * (4 - samples.ndim) + samples.shape) if samples.ndim < 4 else samples
+        samples = samples.reshape((1,) * (4 - samples.ndim) + samples.shape)
         for share in SHARES:
             kept = []
             for name in (OURS, *CODERS):

@@ -25,7 +25,6 @@ fn a_bare_stream_gives_its_file_and_what_follows_it() {
     }
 }
 
-/// Each of these makes another file, or none.
 #[test]
 fn every_flipped_byte_is_noticed() {
     let file = example(2);

@@ -66,7 +66,7 @@ impl Incoming {
 impl Read for Incoming {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.current.len() {
-            let _ = self.spare.send(std::mem::take(&mut self.current)); // nobody may want it any more
+            let _ = self.spare.send(std::mem::take(&mut self.current)); // the caller's end may be gone
             self.at = 0;
             self.current = self.next()?.unwrap_or_default();
         }
@@ -150,6 +150,6 @@ impl FrameWindow for Window {
 
 impl Drop for Window {
     fn drop(&mut self) {
-        self.frames.drain(..).for_each(|frame| drop(self.spare.send(frame))); // nobody may want it any more
+        self.frames.drain(..).for_each(|frame| drop(self.spare.send(frame))); // the caller's end may be gone
     }
 }

@@ -73,14 +73,14 @@ class WavesplatReader(VTKPythonAlgorithmBase):
     def RequestInformation(self, request: Any, inputs: Any, outputs: Any) -> int:
         """Says when and where there are samples."""
         file, information = self._open(), outputs.GetInformationObject(0)
-        when = times(file)
+        when, where = times(file), places(file)
         information.Set(_PIPELINE.TIME_STEPS(), when.tolist(), len(when))
         information.Set(_PIPELINE.TIME_RANGE(), [when.min(), when.max()], 2)
         ends = [end for length in file.shape[:0:-1] for end in (0, length - 1)]
         information.Set(_PIPELINE.WHOLE_EXTENT(), ends, 6)
         information.Set(vtkAlgorithm.CAN_PRODUCE_SUB_EXTENT(), 1)
-        information.Set(vtkDataObject.SPACING(), distances(file, places(file)), 3)
-        information.Set(vtkDataObject.ORIGIN(), corner(places(file)), 3)
+        information.Set(vtkDataObject.SPACING(), distances(file, where), 3)
+        information.Set(vtkDataObject.ORIGIN(), corner(where), 3)
         return 1
 
     def RequestData(self, request: Any, inputs: Any, outputs: Any) -> int:
