@@ -30,8 +30,7 @@ pub(crate) fn encode<'py>(
     request: &str,
 ) -> PyResult<Bound<'py, PyBytes>> {
     fork::refuse()?;
-    let request: ConvertRequest = serde_json::from_str(request).map_err(|e| PyValueError::new_err(e.to_string()))?;
-    let sample = named(sample)?;
+    let (request, sample) = (parsed(request)?, named(sample)?);
     let samples = samples.try_readonly().map_err(borrowed)?.as_slice()?.to_vec();
     let convert = || {
         let source = ArraySource::new(Grid::unit(dims), sample, samples)?;
@@ -43,8 +42,7 @@ pub(crate) fn encode<'py>(
 /// Checks a request.
 #[pyfunction]
 pub(crate) fn check(request: &str) -> PyResult<()> {
-    let request: ConvertRequest = serde_json::from_str(request).map_err(|e| PyValueError::new_err(e.to_string()))?;
-    request.check().map_err(raised)
+    parsed(request)?.check().map_err(raised)
 }
 
 /// A decoded stream: its samples, its voxels along x, y and z, and frames, and where the next one begins.
@@ -84,6 +82,9 @@ pub(crate) fn decode<'py>(
 }
 
 fn named(sample: &str) -> PyResult<SampleType> {
-    let unknown = || PyValueError::new_err(format!("no sample type {sample}"));
-    SampleType::ALL.into_iter().find(|ty| ty.name() == sample).ok_or_else(unknown)
+    sample.parse().map_err(PyValueError::new_err::<String>)
+}
+
+fn parsed(request: &str) -> PyResult<ConvertRequest> {
+    serde_json::from_str(request).map_err(|e| PyValueError::new_err(e.to_string()))
 }
