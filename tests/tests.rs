@@ -40,6 +40,7 @@ mod scheme_choice; // the chosen scheme is nearly the smallest
 mod several_views; // several views in one run
 mod solver_frames; // frames of a real solver, where they are available
 mod specification; // decoding as `format/FORMAT.md` says, bit by bit
+mod together; // conversions side by side give the bytes of each alone
 mod truncation; // the kept coefficients are nearly the fewest
 #[cfg(feature = "view")]
 mod viewer; // `wavesplat view` and pages of pictures

@@ -9,6 +9,7 @@ use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::Access;
 use wavesplat_core::base::sample::SampleType;
+use wavesplat_core::source::follow::Follow;
 use wavesplat_core::source::{self, FrameSource, OpenOptions, RegularTimes, Selection, VariableInfo, with_times};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::setting;
@@ -90,6 +91,12 @@ pub struct InputArgs {
     /// Read files instead of mapping them (for network file systems and files that may change)
     #[arg(long, help_heading = "Input")]
     pub no_mmap: bool,
+    /// The run that writes the inputs, if it goes on
+    #[arg(skip)]
+    pub follow: Option<Follow>,
+    /// The number of variables that are read in turn
+    #[arg(skip = 1_usize)]
+    pub in_turn: usize,
 }
 
 impl InputArgs {
@@ -116,6 +123,11 @@ impl InputArgs {
         formats::undecided(inputs, &self.options(memory))
     }
 
+    /// The variables that `--variable` can choose.
+    pub fn variables(&self, inputs: &[PathBuf], memory: usize) -> Result<Vec<VariableInfo>> {
+        formats::variables(inputs, &self.options(memory))
+    }
+
     /// All options but times, which may be in a file.
     fn options(&self, memory: usize) -> OpenOptions {
         OpenOptions {
@@ -137,6 +149,8 @@ impl InputArgs {
             clock: None,
             allow_gaps: self.allow_gaps,
             memory,
+            follow: self.follow.clone(),
+            in_turn: self.in_turn,
         }
     }
 

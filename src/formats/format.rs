@@ -1,12 +1,13 @@
 //! A format: its names, how its files are recognised, and how they are read and written.
 
 use super::arrays::ArrayArchive;
+use super::shared::offer::Offer;
 use super::writer::Writer;
 use std::path::Path;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::source::file_header::FileHeader;
 use wavesplat_core::source::series::FrameFiles;
-use wavesplat_core::source::{Extent, OpenOptions, VariableInfo};
+use wavesplat_core::source::{Extent, OpenOptions};
 
 /// A format of files.
 pub(crate) struct Format {
@@ -48,8 +49,8 @@ pub(crate) enum Choices {
     None,
     /// The components of its only array.
     Components,
-    /// What this function lists; nothing if it is clear which variable is meant.
-    Variables(fn(&Path) -> Result<Vec<VariableInfo>>),
+    /// What this function lists.
+    Variables(fn(&Path) -> Result<Offer>),
 }
 
 impl Format {

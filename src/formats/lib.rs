@@ -47,7 +47,7 @@ pub use contents::plain;
 pub use npy::{ArrayHeader, array_header};
 #[doc(hidden)]
 pub use open::inputs::files;
-pub use open::{open, open_arrays, open_named_stream, open_stream, undecided};
+pub use open::{open, open_arrays, open_named_stream, open_stream, undecided, variables};
 pub use order::{Direction, OutputAxis, SampleOrder};
 pub use writer::SampleFormat;
 

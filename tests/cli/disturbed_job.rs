@@ -56,6 +56,14 @@ impl Job {
         Self::new(work, &format!("convert {input} -o {FILE} {options} {from}"), "--resume", &[FILE])
     }
 
+    /// A conversion of two variables, frames of which are in the same files.
+    pub(super) fn convert_two(archive: &Archive, options: &str) -> Self {
+        let work = Work::new();
+        write_two(&work, archive);
+        let line = format!("convert steps/ -o %n.wspl --variable all {options}");
+        Self::new(work, &line, "--resume", &["wave.wspl", "twice.wspl"])
+    }
+
     /// Appends the last frames to a file of the first ones.
     pub(super) fn append(archive: &Archive, first: usize, options: &str) -> Self {
         let work = Work::new();
@@ -137,6 +145,25 @@ impl Job {
     }
 
     fn work_files(&self) -> &'static [&'static str] {
-        &["a.npy", "first.npy", "a.wspl"]
+        &["a.npy", "first.npy", "a.wspl", "steps"]
+    }
+}
+
+/// Writes a VTK file of two variables for each frame, into `steps/`: `wave`, the archive, and `twice`, its double.
+pub(super) fn write_two(work: &Work, archive: &Archive) {
+    let ([x, y, z], voxels) = (archive.dims, archive.frame_len());
+    let head = format!(
+        "# vtk DataFile Version 3.0\nstep\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS {x} {y} {z}\nORIGIN 0 0 0\n\
+         SPACING 1 1 1\nPOINT_DATA {voxels}\n"
+    );
+    for frame in 0..archive.frames {
+        let mut file = head.clone().into_bytes();
+        for (name, factor) in [("wave", 1.0), ("twice", 2.0)] {
+            file.extend(format!("SCALARS {name} float 1\nLOOKUP_TABLE default\n").into_bytes());
+            let values = &archive.values[frame * voxels..][..voxels];
+            file.extend(values.iter().flat_map(|value| (factor * value).to_be_bytes()));
+            file.push(b'\n');
+        }
+        work.write(&format!("steps/step_{frame}.vtk"), file);
     }
 }

@@ -110,6 +110,13 @@ fn a_conversion_killed_at_any_time_is_resumed_to_the_same_bytes() {
 }
 
 #[test]
+fn variables_side_by_side_are_resumed_each_to_the_same_bytes() {
+    let jobs = ["--window 8", "--window 4 --threads 1 --basis haar"];
+    let jobs = jobs.map(|options| Job::convert_two(&archive(), options));
+    rounds(&jobs, 30, 3);
+}
+
+#[test]
 fn a_killed_append_leaves_the_file_and_is_resumed_to_the_same_bytes() {
     let jobs = [
         (16, "--window 4"),

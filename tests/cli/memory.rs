@@ -7,7 +7,7 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 
 /// Memory that the programs may take in addition to `--memory`: code, stacks and the allocator's overhead.
-const SLACK_MIB: usize = 40;
+pub(super) const SLACK_MIB: usize = 40;
 
 /// A sparse archive with some structure in every frame.
 fn write_sparse(work: &Work, name: &str, [nx, ny, nz, nt]: [usize; 4]) {

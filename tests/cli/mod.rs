@@ -18,6 +18,7 @@ mod depth_and_provenance; // 16 bits per channel, OpenEXR, and what made a pictu
 mod disturbed_job; // helper: a command that is disturbed and completed
 mod extract_and_verify; // `info`, `verify` and `extract`
 mod failing_files; // inputs and outputs that fail
+mod follow; // frames are converted while a run writes them
 mod formats_out; // extracted samples in the formats of other programs
 mod guide; // README and the guide: commands run, links lead somewhere
 mod help; // help texts
@@ -216,6 +217,13 @@ impl Run {
         assert!(!self.out.is_empty(), "{}: nothing on standard output", self.args);
         let found = Self { out: Vec::new(), ..self };
         found.fails(code, words)
+    }
+
+    /// Asserts that it failed, and printed all these words on standard error and nothing on standard output.
+    #[track_caller]
+    fn fails_with(self, words: &[&str]) -> Self {
+        let code = self.code.filter(|code| *code != 0).unwrap_or_else(|| panic!("{} succeeded", self.args));
+        self.fails(code, words)
     }
 
     /// [`Self::fails`] or [`Self::finds`], as the program requires.

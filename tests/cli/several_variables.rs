@@ -1,6 +1,9 @@
 //! Several variables of an archive: each in a file of its own, or the length of a vector.
 
-use super::{Work, floats, read_npy};
+use super::disturbed_job::write_two;
+#[cfg(target_os = "linux")]
+use super::memory::SLACK_MIB;
+use super::{Archive, Work, floats, read_npy};
 
 /// A file of `tests/golden/inputs`.
 fn input(name: &str) -> String {
@@ -28,6 +31,58 @@ fn each_variable_becomes_a_file() {
     assert!(work.names().contains(&"e_velocity_2.wspl".to_string()), "{:?}", work.names());
     let twice = format!("convert {source} -o d_%n.wspl --variable {},{}", names[0], names[0]);
     work.wavesplat(&twice).fails(2, &["two variables"]);
+}
+
+#[test]
+fn a_variable_that_cannot_be_converted_does_not_end_the_others() {
+    let (work, mut archive) = (Work::new(), Archive::smooth([12, 10, 8], 40));
+    archive.values[20 * 12 * 10 * 8] = f32::MAX; // its double is infinite
+    write_two(&work, &archive);
+    let line = "convert steps/ --variable all --window 8";
+    let run = work.wavesplat(&format!("{line} -o %n.wspl"));
+    run.fails_with(&[
+        "twice.wspl.part: the finished windows are kept",
+        "twice.wspl: not converted",
+        "step_20.vtk",
+        "1 variable(s)",
+    ]);
+    assert_eq!(work.names(), ["steps", "twice.wspl.part", "wave.wspl"]);
+    // What is left is mended and continued; the finished file stays.
+    archive.values[20 * 12 * 10 * 8] = 1.0;
+    let before = work.read("wave.wspl");
+    write_two(&work, &archive);
+    work.wavesplat(&format!("{line} -o %n.wspl --resume")).ok();
+    assert!(work.read("wave.wspl") == before);
+    work.wavesplat("convert steps/ --variable twice --window 8 -o alone.wspl").ok();
+    assert!(work.read("twice.wspl") == work.read("alone.wspl"));
+}
+
+/// Chunks of Zarr arrays span more frames than a window, so each source keeps one for the next window.
+#[cfg(all(feature = "zarr", target_os = "linux"))]
+#[test]
+fn sources_of_many_variables_share_the_memory_of_one() {
+    const CHUNK: usize = 16 * 16 * 16;
+    let (work, frames, memory) = (Work::new(), 48, 160);
+    for name in ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l"] {
+        let array = format!(
+            r#"{{"zarr_format": 2, "shape": [{frames}, 32, 32, 64], "chunks": [{frames}, 16, 16, 16], "dtype": "<f4",
+                "compressor": null, "fill_value": 0, "order": "C", "filters": null}}"#
+        );
+        work.write(&format!("run.zarr/{name}/.zarray"), array);
+        work.write(&format!("run.zarr/{name}/.zattrs"), r#"{"_ARRAY_DIMENSIONS": ["time", "z", "y", "x"]}"#);
+        let wave = |i: usize| ((i % CHUNK) as f32 * 0.01 + (i / CHUNK) as f32).sin();
+        let samples: Vec<u8> = (0..frames * CHUNK).flat_map(|i| wave(i).to_le_bytes()).collect();
+        for chunk in 0..16 {
+            let [z, y, x] = [chunk / 8, chunk / 4 % 2, chunk % 4];
+            work.write(&format!("run.zarr/{name}/0.{z}.{y}.{x}"), &samples);
+        }
+    }
+    work.write("run.zarr/.zgroup", r#"{"zarr_format": 2}"#);
+    let limit = format!("ulimit -d {};", (memory + SLACK_MIB) << 10);
+    let convert = format!("exec $WAVESPLAT convert run.zarr --threads 2 --memory {memory}MiB --block 16");
+    work.shell(&format!("{limit} {convert} --variable all -o %n.wspl")).ok();
+    work.shell(&format!("{limit} {convert} --variable h -o alone.wspl")).ok();
+    assert!(work.read("h.wspl") == work.read("alone.wspl"));
 }
 
 #[test]

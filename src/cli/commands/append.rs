@@ -1,6 +1,6 @@
 //! `wavesplat append`
 
-use super::convert::report;
+use super::convert::{Files, report};
 use crate::{CommonArgs, FrameRange, InputArgs, narrow, spare_inputs};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let progress = args.common.progress("convert", "blocks");
     let done = append(source.as_mut(), &config, &file, if_unfinished, &progress);
     drop(progress); // clears its bar before notes are printed
-    report(done, config.bound, &path, &args.common)
+    report(done, config.bound, &path, &args.common, Files::One)
 }
 
 /// Whether all inputs are shards, which are copied; other coefficient files are sources like any other.

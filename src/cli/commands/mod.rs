@@ -10,7 +10,6 @@ mod page;
 mod recover;
 mod results;
 mod scan;
-mod several;
 mod verify;
 
 use crate::generate::{self, GenerateArgs};
@@ -76,7 +75,7 @@ impl Cli {
     /// Those of the command.
     pub fn run(self) -> Result<()> {
         match self.command {
-            Command::Convert(args) => several::run(&args),
+            Command::Convert(args) => convert::run(&args),
             Command::Append(args) => append::run(&args),
             Command::Info(args) => info::run(&args),
             Command::Verify(args) => verify::run(&args),

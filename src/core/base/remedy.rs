@@ -5,7 +5,7 @@ use std::fmt::{self, Display};
 /// What a caller can do about an error or a note. Fields are named as in the configuration that they belong to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Remedy {
-    /// Set this field, which overrides the files: `spacing`, `origin` or `axes`.
+    /// Set this field, which overrides the files: `spacing`, `origin`, `axes` or `times`.
     Set(&'static str),
     /// Choose an array by `variable`.
     ChooseVariable,

@@ -36,6 +36,7 @@ use wavesplat_format::{pack_codes, pack_exact, pack_missing, pack_outliers, pack
 /// The encoder of one worker.
 #[derive(Debug)]
 pub struct Encoder {
+    level: i32,
     compressor: Compressor,
     codes: Buffer<i32>,
     raw: Vec<u8>,
@@ -57,7 +58,18 @@ pub struct Encoded {
 impl Encoder {
     /// Creates an encoder with a zstd level.
     pub fn new(level: i32) -> wavesplat_format::Result<Self> {
-        Ok(Self { compressor: Compressor::new(level)?, codes: Buffer::default(), raw: Vec::new(), computed: None })
+        Ok(Self {
+            level,
+            compressor: Compressor::new(level)?,
+            codes: Buffer::default(),
+            raw: Vec::new(),
+            computed: None,
+        })
+    }
+
+    /// Its zstd level.
+    pub fn level(&self) -> i32 {
+        self.level
     }
 
     /// The encoder, which also measures the errors of what is computed.

@@ -8,6 +8,7 @@ mod array;
 mod colour_transform;
 pub mod extremes;
 pub mod file_header;
+pub mod follow;
 pub mod frames;
 mod int64;
 pub mod layout;
@@ -37,6 +38,7 @@ use crate::base::grid::{Grid, Region};
 use crate::base::mapped::Access;
 use crate::base::sample::SampleType;
 use crate::base::time_labels::TimeLabels;
+use follow::Follow;
 use std::ops::Range;
 
 /// A result for one file. The error is a text that follows the file's name.
@@ -95,6 +97,10 @@ pub struct OpenOptions {
     pub allow_gaps: bool,
     /// Bytes of memory for one window of a stream or of decoded frames. More go to a temporary file.
     pub memory: usize,
+    /// The run that writes the inputs, if it goes on. Then frames are read as they appear, and their number is known at the end.
+    pub follow: Option<Follow>,
+    /// The number of sources that are read in turn, and share `memory`. 1 for one that is read alone.
+    pub in_turn: usize,
 }
 
 impl Default for OpenOptions {
@@ -119,14 +125,23 @@ impl Default for OpenOptions {
             clock: None,
             allow_gaps: false,
             memory: 256 << 20,
+            follow: None,
+            in_turn: 1,
         }
     }
 }
 
 impl OpenOptions {
-    /// Bytes of `memory` for the frames of a window. Those of wide samples get less, since their blocks need more of a budget.
+    /// Bytes of `memory` for the frames of a window. Those of wide samples get less, since their blocks need more of a budget; sources
+    /// that are read in turn leave room for what the others keep.
     pub fn for_window(&self, sample: SampleType) -> usize {
-        self.memory / (sample.size() / 2).max(1)
+        let memory = if self.in_turn > 1 { self.memory / 2 } else { self.memory };
+        memory / (sample.size() / 2).max(1)
+    }
+
+    /// Bytes of `memory` for decoded frames that a source keeps for its next window.
+    pub fn for_next_window(&self, sample: SampleType) -> usize {
+        self.for_window(sample) / self.in_turn.max(1)
     }
 
     /// Without the options for headerless data.
@@ -223,7 +238,7 @@ impl Archive {
 
 /// Frames in order, a window at a time.
 pub trait FrameSource: Send {
-    /// The description of the archive.
+    /// The description of the archive. Of one that grows, it is complete once a window ends before it is full.
     fn archive(&self) -> &Archive;
 
     /// The `count` frames from `first`; fewer only if a stream ends there, then possibly none.

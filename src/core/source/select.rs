@@ -25,30 +25,39 @@ impl Selection {
         let all = self.first..archive.frames.unwrap_or(0);
         all.step_by(self.step).take(self.frames.unwrap_or(usize::MAX)).collect()
     }
+
+    /// The selected part of an archive.
+    fn narrow(&self, mut archive: Archive) -> Archive {
+        let frames = self.numbers(&archive);
+        archive.description = archive.description.map(|all| narrowed(&all, &frames, &self.region, 1));
+        archive.grid = archive.grid.crop(&self.region);
+        archive.frames = self.frames;
+        archive.times = archive.times.iter().skip(self.first).step_by(self.step).copied().collect();
+        archive.times.truncate(self.frames.unwrap_or(usize::MAX));
+        archive.regular_times = archive.regular_times.map(|times| times.stepped(self.first, self.step));
+        archive
+    }
 }
 
 /// Narrows a source to a selection, which must lie within it.
 pub fn select(source: Box<dyn FrameSource>, selection: Selection) -> Result<Box<dyn FrameSource>> {
-    let mut archive = source.archive().clone();
+    let archive = source.archive().clone();
     let whole = archive.grid.whole();
     if !whole.contains(&selection.region) || selection.region.is_empty() {
         let [x, y, z] = archive.grid.dims;
         return Err(Error::setting("region", format!("not within the volume of {x}x{y}x{z} voxels, or empty")));
     }
-    let frames = selection.numbers(&archive);
-    archive.description = archive.description.map(|all| narrowed(&all, &frames, &selection.region, 1));
-    archive.grid = archive.grid.crop(&selection.region);
-    archive.frames = selection.frames;
-    archive.times = archive.times.iter().skip(selection.first).step_by(selection.step).copied().collect();
-    archive.times.truncate(selection.frames.unwrap_or(usize::MAX));
-    archive.regular_times = archive.regular_times.map(|times| times.stepped(selection.first, selection.step));
-    Ok(Box::new(Selected { source, archive, selection }))
+    let archive = selection.narrow(archive);
+    let grows = source.archive().frames.is_none();
+    Ok(Box::new(Selected { source, archive, selection, grows }))
 }
 
 struct Selected {
     source: Box<dyn FrameSource>,
     archive: Archive,
     selection: Selection,
+    /// Whether the number of frames is not known at first.
+    grows: bool,
 }
 
 impl FrameSource for Selected {
@@ -59,6 +68,9 @@ impl FrameSource for Selected {
     fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
         let Selection { first: start, step, region, .. } = self.selection;
         let window = self.source.window_of(start + first * step, count, step)?;
+        if self.grows {
+            self.archive = self.selection.narrow(self.source.archive().clone());
+        }
         Ok(Box::new(NarrowedWindow { frames: window.frames(), window, start: region.start, step: 1 }))
     }
 }

@@ -46,6 +46,7 @@ pub struct Series {
     shape: Shape,
     access: Access,
     memory: usize, // that a window may hold of what is decoded
+    kept: usize,   // bytes of it that may stay for the next window
     parts: Vec<Part>,
     starts: Vec<usize>, // the first frame of each part
     last: Option<Decoded>,
@@ -67,6 +68,97 @@ struct PartStart {
     byte: u64,
 }
 
+/// Files that become an archive one after another.
+#[derive(Debug)]
+pub struct SeriesBuilder {
+    series: Series,
+    first: FileHeader,
+    /// The name of the first file for messages.
+    name: String,
+    /// The first file that is placed otherwise than the first of all.
+    placed_otherwise: Option<PathBuf>,
+    /// Why the times of a file are not on the clock of the first one.
+    timed_otherwise: Option<String>,
+    /// What later files say of their frames.
+    more: Vec<Option<Description>>,
+    options: OpenOptions,
+}
+
+impl SeriesBuilder {
+    /// Begins with the first of several files, or the only one.
+    pub fn begin(path: &Path, header: FileHeader, is_alone: bool, options: &OpenOptions) -> Self {
+        let mut first = on_grid_of_user(header, options);
+        if !is_alone || first.parts.len() > 1 {
+            first.stack_frames();
+        }
+        Self {
+            series: Series::starting_with(&mut first, options),
+            name: format!("the first frame ({})", path.display()),
+            first,
+            placed_otherwise: None,
+            timed_otherwise: None,
+            more: Vec::new(),
+            options: options.clone(),
+        }
+    }
+
+    /// Adds the next file.
+    ///
+    /// # Errors
+    /// It is unlike the first one.
+    pub fn add(&mut self, path: &Path, header: FileHeader) -> Result<()> {
+        let mut file = on_grid_of_user(header, &self.options);
+        let unlike = file.follows(&self.first, &self.name).map_err(|e| Error::input(path, e))?;
+        if unlike.grid {
+            self.placed_otherwise.get_or_insert_with(|| path.into());
+        }
+        if unlike.times {
+            file.drop_bounds_of_times();
+            if let Err(why) = times::onto_clock(&mut file, &self.first.units) {
+                self.timed_otherwise.get_or_insert_with(|| format!("{} {why}", path.display()));
+            }
+        }
+        file.stack_frames();
+        self.more.push(file.description.take());
+        self.series.take(&mut file);
+        Ok(())
+    }
+
+    /// The frames so far, before the times of the user take the place of their own.
+    pub fn so_far(&self) -> &Series {
+        &self.series
+    }
+
+    /// As [`Self::so_far`], to read them.
+    pub fn so_far_mut(&mut self) -> &mut Series {
+        &mut self.series
+    }
+
+    /// The times of the frames so far by their `files`; empty unless each has a finite one on the clock of the first file.
+    pub fn times<'a>(&'a self, files: &'a FrameFiles) -> &'a [f64] {
+        let (frames, own) = (self.series.archive.frames.unwrap_or(0), &self.series.archive.times);
+        let times = match (files.times.len() == frames, &self.timed_otherwise) {
+            (true, _) => &files.times,
+            (false, None) if own.len() == frames => own,
+            _ => return &[],
+        };
+        if times.iter().all(|time| time.is_finite()) { times } else { &[] }
+    }
+
+    /// The archive of `files`, which were added.
+    ///
+    /// # Errors
+    /// Options of the user that do not fit it.
+    pub fn finish(mut self, files: &FrameFiles) -> Result<Series> {
+        if let Some(path) = self.placed_otherwise {
+            let what = "the spacing and origin are those of the first file";
+            note_once(&mut self.series.archive.notes, format!("{what}; {} has others", path.display()));
+        }
+        self.series.describe_more(self.more);
+        self.series.finish(files, self.timed_otherwise, &self.options)
+    }
+}
+
 impl Series {
     /// Reads the header of every file by `describe`.
     pub fn open(
@@ -74,37 +166,14 @@ impl Series {
         options: &OpenOptions,
         describe: impl Fn(&Path, Extent) -> Result<FileHeader>,
     ) -> Result<Self> {
-        let describe = |path: &Path, extent| describe(path, extent).map(|header| on_grid_of_user(header, options));
-        let Some((first_path, rest)) = files.paths.split_first() else {
+        let Some((first, rest)) = files.paths.split_first() else {
             return Err(Error::setting("inputs", "no input was given"));
         };
-        let mut first = describe(first_path, Extent::Whole)?;
-        if !rest.is_empty() || first.parts.len() > 1 {
-            first.stack_frames();
-        }
-        let mut series = Self::starting_with(&mut first, options);
-        let name = format!("the first frame ({})", first_path.display());
-        let (mut placed_otherwise, mut timed_otherwise, mut more) = (None, None, Vec::new());
+        let mut series = SeriesBuilder::begin(first, describe(first, Extent::Whole)?, rest.is_empty(), options);
         for path in rest {
-            let mut file = describe(path, Extent::AlongTime)?;
-            let unlike = file.follows(&first, &name).map_err(|e| Error::input(path, e))?;
-            placed_otherwise = placed_otherwise.or(unlike.grid.then_some(path));
-            if unlike.times {
-                file.drop_bounds_of_times();
-                if let Err(why) = times::onto_clock(&mut file, &first.units) {
-                    timed_otherwise = timed_otherwise.or(Some(format!("{} {why}", path.display())));
-                }
-            }
-            file.stack_frames();
-            more.push(file.description.take());
-            series.take(&mut file);
+            series.add(path, describe(path, Extent::AlongTime)?)?;
         }
-        if let Some(path) = placed_otherwise {
-            let what = "the spacing and origin are those of the first file";
-            note_once(&mut series.archive.notes, format!("{what}; {} has others", path.display()));
-        }
-        series.describe_more(more);
-        series.finish(files, timed_otherwise, options)
+        series.finish(files)
     }
 
     /// The frames that one header describes. Messages call where they are from `name`.
@@ -127,8 +196,9 @@ impl Series {
             ..Archive::new(first.grid(), first.shape.sample(), Some(0))
         };
         let (shape, parts, starts) = (first.shape, Vec::new(), Vec::new());
-        let (access, memory) = (options.access, options.for_window(first.shape.sample()));
-        let mut series = Self { archive, shape, access, memory, parts, starts, last: None };
+        let (access, sample) = (options.access, first.shape.sample());
+        let (memory, kept) = (options.for_window(sample), options.for_next_window(sample));
+        let mut series = Self { archive, shape, access, memory, kept, parts, starts, last: None };
         series.take(first);
         series
     }
@@ -282,7 +352,7 @@ impl Series {
         let mut data = SpillBuffer::within(stored.bytes, room, spool, path)?;
         decoder.decode(path, first..(first + together).min(*frames), &mut data)?;
         let data = Arc::new(data);
-        if together > 1 {
+        if together > 1 && data.memory() <= self.kept {
             self.last = Some(Decoded { part, first, data: data.clone() });
         }
         Ok(data)

@@ -10,6 +10,7 @@ use super::{ConvertConfig, MissingPolicy, Plan, WindowJob, WindowsDone};
 use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use wavesplat_core::base::description::Description;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::base::sample::{self, SampleType, join_ranges};
@@ -35,50 +36,128 @@ pub(super) struct BlockSamples {
     pub(super) samples: Buffer<u8>,
 }
 
-/// Reads all windows in order until the frames end, and sends those that the file does not have yet. Returns the time
-/// spent reading, and what it saw in the samples.
-pub(super) fn read(
-    source: &mut dyn FrameSource,
-    input: &CodedInput,
-    plan: &Plan<'_>,
-    done: &WindowsDone,
-    out: &Sender<NextBlock>,
-) -> Result<(Duration, Findings)> {
-    let mut reader = WindowReader::new(input, plan, done);
-    done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
-    reader.before = reader.frames;
-    let mut busy = Duration::ZERO;
-    for index in done.first_window.. {
-        let started = Instant::now();
-        let known = done.windows.get(index);
-        let Some(window) = reader.next(source, known.map_or(input.config.window, |w| w.frames as usize))? else {
-            match known {
-                Some(_) => return Err(reader.ended(done)),
-                None => break,
-            }
-        };
-        if let Some(known) = known {
-            reader.skip_done(window.as_ref(), known, done)?;
-            busy += started.elapsed();
-            continue;
-        }
-        let is_short = |window: &Window| (window.frames as usize) < input.config.window;
-        if index > done.first_window && done.windows.get(index - 1).is_some_and(is_short) {
-            return Err(reader.has_grown(done));
-        }
-        let job = Arc::new(reader.prepare(window.as_ref(), index)?);
-        busy += started.elapsed();
-        if !reader.send_blocks(window.as_ref(), &job, out, &mut busy)? || window.frames() < input.config.window {
-            break; // the frames ended, or a later stage failed and reports why
+/// Reads windows of all sources in turn until their frames end, and sends those that the files do not have yet. Returns the
+/// time spent reading each source, and what it found.
+pub(super) fn read(mut readers: Vec<SourceReader<'_>>, out: &Sender<NextBlock>) -> Vec<Result<Reading>> {
+    let is_over = |reader: &SourceReader<'_>| reader.ended.is_some();
+    while let Some(next) =
+        readers.iter_mut().filter(|reader| !is_over(reader)).min_by_key(|reader| reader.frames_read())
+    {
+        match next.read_window(out) {
+            Ok(Next::Window) => {}
+            Ok(Next::End) => next.end(Ok(())),
+            Ok(Next::Unwanted) => break,
+            Err(error) => next.end(Err(error)),
         }
     }
-    Ok((busy, reader.findings))
+    readers.into_iter().map(SourceReader::finish).collect()
+}
+
+/// The result of reading a source.
+pub(super) struct Reading {
+    /// The time that it took.
+    pub(super) busy: Duration,
+    pub(super) findings: Findings,
+    /// The source's description, which is complete when all frames were read.
+    pub(super) description: Option<Description>,
+}
+
+/// What follows a window.
+enum Next {
+    Window,
+    /// The frames ended.
+    End,
+    /// A later stage failed, and reports why.
+    Unwanted,
+}
+
+/// Reads the source of one conversion.
+pub(super) struct SourceReader<'a> {
+    source: &'a mut dyn FrameSource,
+    reader: WindowReader<'a>,
+    done: WindowsDone,
+    /// The number of the next window.
+    index: usize,
+    busy: Duration,
+    ended: Option<Result<()>>,
+}
+
+impl<'a> SourceReader<'a> {
+    pub(super) fn new(
+        conversion: usize,
+        source: &'a mut dyn FrameSource,
+        input: &'a CodedInput,
+        plan: &'a Plan<'a>,
+        done: WindowsDone,
+    ) -> Self {
+        let mut reader = WindowReader { conversion, ..WindowReader::new(input, plan, &done) };
+        done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
+        reader.before = reader.frames;
+        Self { source, reader, index: done.first_window, done, busy: Duration::ZERO, ended: None }
+    }
+
+    /// The blocks of tier 0 of the file; none if the number of frames is not known.
+    pub(super) fn blocks(&self) -> Option<u64> {
+        let WindowReader { archive, config, plan, .. } = &self.reader;
+        let windows = archive.frames?.div_ceil(config.window) + self.done.first_window;
+        Some((windows * plan.blocks_of_window()) as u64)
+    }
+
+    /// The blocks of tier 0 that the file has already.
+    pub(super) fn blocks_done(&self) -> u64 {
+        (self.done.windows.len() * self.reader.plan.blocks_of_window()) as u64
+    }
+
+    fn frames_read(&self) -> usize {
+        self.reader.first()
+    }
+
+    fn end(&mut self, how: Result<()>) {
+        self.ended = Some(how);
+    }
+
+    fn finish(self) -> Result<Reading> {
+        let Self { source, reader, busy, ended, .. } = self;
+        let description = source.archive().description.clone();
+        ended.unwrap_or(Ok(())).map(|()| Reading { busy, findings: reader.findings, description })
+    }
+
+    /// Reads the next window, and sends its blocks unless the file has it.
+    fn read_window(&mut self, out: &Sender<NextBlock>) -> Result<Next> {
+        let (started, full) = (Instant::now(), self.reader.config.window);
+        let known = self.done.windows.get(self.index);
+        let Some(window) = self.reader.next(self.source, known.map_or(full, |known| known.frames as usize))? else {
+            return if known.is_some() { Err(self.reader.ended(&self.done)) } else { Ok(Next::End) };
+        };
+        let index = self.index;
+        self.index += 1;
+        if let Some(known) = known {
+            self.reader.skip_done(window.as_ref(), known, &self.done)?;
+            self.busy += started.elapsed();
+            return Ok(Next::Window);
+        }
+        let is_short = |window: &Window| (window.frames as usize) < full;
+        if index > self.done.first_window && self.done.windows.get(index - 1).is_some_and(is_short) {
+            return Err(self.reader.has_grown(&self.done));
+        }
+        let first = self.reader.first();
+        let times = self.source.archive().times_of(first..first + window.frames());
+        let job = Arc::new(WindowJob { times, ..self.reader.prepare(window.as_ref(), index)? });
+        self.busy += started.elapsed();
+        match self.reader.send_blocks(window.as_ref(), &job, out, &mut self.busy)? {
+            true if window.frames() < full => Ok(Next::End),
+            true => Ok(Next::Window),
+            false => Ok(Next::Unwanted),
+        }
+    }
 }
 
 /// The samples that a scheme is chosen from are divided by this, if it need not be the best.
 const ROUGH: usize = 4;
 
 pub(super) struct WindowReader<'a> {
+    /// Which of the conversions it is of.
+    conversion: usize,
     config: &'a ConvertConfig,
     plan: &'a Plan<'a>,
     /// The archive of the coded samples.
@@ -120,6 +199,7 @@ impl<'a> WindowReader<'a> {
         });
         let (id, range, scheme) = (done.id, None, None);
         Self {
+            conversion: 0,
             config,
             plan,
             archive,
@@ -214,9 +294,9 @@ impl<'a> WindowReader<'a> {
         self.job(window, index, &scan)
     }
 
-    /// Fixes the error bound of a window and chooses its scheme, from what a scan saw.
+    /// Fixes the error bound of a window and chooses its scheme, from what a scan saw. The source has its times.
     pub(super) fn job(&mut self, window: &dyn FrameWindow, index: usize, scan: &Scan) -> Result<WindowJob> {
-        let (config, first) = (self.config, self.first());
+        let config = self.config;
         let of_window = if self.plan.colour_transform.is_some() { BRIGHTNESS } else { scan.range };
         let range = self.range.map_or(of_window, |r| join_ranges(r, of_window));
         self.range = Some(range);
@@ -257,12 +337,11 @@ impl<'a> WindowReader<'a> {
         let id = self.id(scan.digest)?;
         let index =
             u32::try_from(index).map_err(|_| Error::setting("window", "gives too many windows; take longer ones"))?;
-        let times = self.archive.times_of(first..first + window.frames());
         let first_frame = self.frames;
         self.frames += window.frames() as u64;
-        let coarse = CoarseBlocks::new(self.plan.room(&codec).kept_above);
-        let (features, digest) = (self.features, scan.digest);
-        Ok(WindowJob { index, first_frame, id, features, codec, coarse, range, digest, times })
+        let (times, coarse) = (Vec::new(), CoarseBlocks::new(self.plan.room(&codec).kept_above));
+        let (conversion, features, digest) = (self.conversion, self.features, scan.digest);
+        Ok(WindowJob { conversion, index, first_frame, id, features, codec, coarse, range, digest, times })
     }
 
     /// The delta of a window. `of_window` is the range of its samples, `range` that of all samples up to its end.

@@ -25,6 +25,7 @@ pub mod estimate;
 mod gather;
 mod learn;
 mod max_error;
+mod pipeline;
 mod plan;
 mod pool;
 mod record;
@@ -37,6 +38,7 @@ mod settings;
 pub mod shard;
 mod smoothness;
 mod spread;
+mod target;
 mod to_bare;
 mod to_file;
 mod trial_boxes;
@@ -46,33 +48,27 @@ mod workers;
 
 use crate::file::report::{BoundReport, WindowReport};
 use coarse::CoarseBlocks;
-use coded_input::CodedInput;
 pub use coding::{BestFor, SchemeConstraint, SpatialPredictor};
-use crossbeam_channel::bounded;
 use estimate::EstimatedErrors;
 pub use max_error::MaxError;
+pub use pipeline::{Conversion, convert, convert_into, convert_together};
 use plan::Plan;
-use record::WindowWriter;
 pub use request::ConvertRequest;
 pub use results::errors_of_results;
-pub use run::{Failure, append, run};
+pub use run::{Failure, Outcome, Task, append, run, run_together};
 use serde::Serialize;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use target::WindowsDone;
+pub use target::{ResumePoint, Target};
 pub use to_bare::convert_to_bare;
 pub use to_file::convert_to_file;
 use wavesplat_core::base::choice::Choice;
-use wavesplat_core::base::description::{Description, is_of};
-use wavesplat_core::base::error::{Error, Note, Result};
+use wavesplat_core::base::error::{Error, Note};
 use wavesplat_core::base::memory;
-use wavesplat_core::base::progress::Progress;
+use wavesplat_core::codec::WindowCodec;
 pub use wavesplat_core::codec::bound::{Bound, range_bound};
-use wavesplat_core::codec::{self, WindowCodec};
 use wavesplat_core::colour::TransferFunction;
-use wavesplat_core::source::{Archive, FrameSource};
 pub use wavesplat_format::{Basis, Packing, Stencil};
-use wavesplat_format::{CompletePrefix, Features, FileId, Keep, Window};
+use wavesplat_format::{Features, FileId, Keep};
 
 /// What to do with NaN, infinities and the declared missing value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -258,132 +254,6 @@ pub struct ConvertReport {
     pub not_kept: Vec<String>,
 }
 
-/// Where a conversion goes on: the complete windows of a file that more frames are added to.
-#[derive(Debug)]
-pub struct ResumePoint {
-    /// The file's complete windows.
-    pub complete: CompletePrefix,
-    /// Number of the window at which the source begins. Earlier windows are not compared with the source.
-    pub first_window: usize,
-    /// The description of the windows before it, if there are any and the file has one.
-    pub description: Option<Description>,
-}
-
-/// The output of a conversion.
-#[derive(Debug)]
-pub struct Target<'a, W> {
-    /// What messages call it.
-    pub name: &'a Path,
-    /// The stream, at the end of the windows that it has already.
-    pub out: W,
-    /// The windows that it has already; `None` begins a file.
-    pub resume_from: Option<ResumePoint>,
-}
-
-/// Converts all frames of `source` into a coefficient file written to `out`, in one pass and without seeking.
-///
-/// `out` is flushed when a window is complete. Messages call it `name`.
-pub fn convert<W: Write>(
-    source: &mut dyn FrameSource,
-    config: &ConvertConfig,
-    name: &Path,
-    out: W,
-    progress: &dyn Progress,
-) -> Result<ConvertReport> {
-    convert_into(source, config, Target { name, out, resume_from: None }, progress)
-}
-
-/// As [`convert`], continuing a partial file after its complete windows if the target has some.
-///
-/// # Errors
-/// Those of [`convert`]; also an error if the partial file has other settings, or was converted from other frames.
-pub fn convert_into<W: Write>(
-    source: &mut dyn FrameSource,
-    config: &ConvertConfig,
-    target: Target<'_, W>,
-    progress: &dyn Progress,
-) -> Result<ConvertReport> {
-    let started = Instant::now();
-    let input = &CodedInput::new(config, source.archive());
-    let plan = Plan::new(input)?;
-    check_description(&input.archive, target.resume_from.as_ref())?;
-    let done = WindowsDone::new(target.resume_from.as_ref(), &plan, &input.archive, target.name)?;
-    let windows = input.archive.frames.map(|f| f.div_ceil(config.window) + done.first_window);
-    progress.start(windows.map(|w| (w * plan.blocks_of_window()) as u64));
-    progress.resume((done.windows.len() * plan.blocks_of_window()) as u64);
-    let mut writer = WindowWriter::new(input, &plan, target);
-    let (to_workers, from_reader) = bounded(0);
-    let (to_writer, from_workers) = bounded(0);
-    let ran = std::thread::scope(|scope| {
-        // Each stage owns its ends of the channels. When a stage ends, even by an error, its neighbours end too.
-        let (plan, done) = (&plan, &done);
-        let reader = scope.spawn(move || gather::read(source, input, plan, done, &to_workers));
-        let workers = scope.spawn(move || workers::encode(config.level, plan, &from_reader, &to_writer));
-        let written = writer.write(from_workers, progress);
-        let (encoded, read) = (join(workers), join(reader));
-        Ok((read?, encoded?, written?)).map(|(read, encoded, ())| (read, encoded))
-    });
-    codec::release_spare();
-    let ((read, findings), encoding) = ran?;
-    let report = writer.finish(started, read, &findings, encoding)?;
-    progress.finish();
-    Ok(report)
-}
-
-/// Checks that the source's description fits its frames, so that a mismatch fails at the start and not at the end.
-fn check_description(archive: &Archive, resume_from: Option<&ResumePoint>) -> Result<()> {
-    let is_appended = resume_from.is_some_and(|point| point.first_window > 0);
-    let fits = |description: &Description| {
-        is_appended || archive.frames.is_some_and(|frames| is_of(description, archive.grid.dims, frames))
-    };
-    match archive.description.as_ref().is_none_or(fits) {
-        true => Ok(()),
-        false => Err(Error::setting("description", "its axes are not those of the frames")),
-    }
-}
-
-/// Propagates the panic of a stage, which is a bug and not an error.
-fn join<T>(stage: std::thread::ScopedJoinHandle<'_, T>) -> T {
-    stage.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-}
-
-/// The windows that a file already has, and their relation to the source's frames.
-#[derive(Debug, Default)]
-struct WindowsDone {
-    id: Option<FileId>,
-    /// Those of the file that is continued.
-    features: Option<Features>,
-    windows: Vec<Window>,
-    /// [`ResumePoint::first_window`]
-    first_window: usize,
-    name: PathBuf,
-}
-
-impl WindowsDone {
-    fn new(resume_from: Option<&ResumePoint>, plan: &Plan<'_>, archive: &Archive, name: &Path) -> Result<Self> {
-        let Some(ResumePoint { complete, first_window, .. }) = resume_from else { return Ok(Self::default()) };
-        let held = complete.metadata();
-        if let Some(what) = settings::difference(&held.start(), &plan.start, *first_window == 0) {
-            return Err(Error::path(name, format!("was begun with another {what}")));
-        }
-        if *first_window == 0 && held.start() != plan.start {
-            return Err(Error::path(name, "was begun with other settings"));
-        }
-        let first = held.windows.get(*first_window).map_or(held.frames, |window| window.first_frame);
-        let frames = held.frames.saturating_sub(first) as usize;
-        if !archive.begins_with_times(held.times.get(first as usize..).unwrap_or_default(), frames) {
-            return Err(Error::path(name, "was begun with other times"));
-        }
-        Ok(Self {
-            id: Some(complete.id()),
-            features: Some(complete.features()),
-            windows: held.windows.clone(),
-            first_window: *first_window,
-            name: name.into(),
-        })
-    }
-}
-
 /// An error for compression failures, which happen only if a size exceeds our own limits.
 fn bug(error: wavesplat_format::Error) -> Error {
     Error::CoefficientFile { path: "encoding".into(), source: error }
@@ -392,6 +262,8 @@ fn bug(error: wavesplat_format::Error) -> Error {
 /// A window, as the reader prepared it.
 #[derive(Debug)]
 struct WindowJob {
+    /// Which of the conversions it is of.
+    conversion: usize,
     index: u32,
     first_frame: u64,
     id: FileId,

@@ -24,6 +24,8 @@ pub(super) struct Plan<'a> {
     /// The metadata before the first frame.
     pub(super) start: Metadata,
     pub(super) blocks: BlockGrid,
+    /// The zstd level.
+    pub(super) level: i32,
     /// For windows whose coefficients are coded in 32-bit floats.
     of_singles: Room,
     /// For windows whose coefficients are coded in 64-bit floats.
@@ -139,7 +141,8 @@ impl<'a> Plan<'a> {
         let of_doubles = room(input, blocks, tiers, size_of::<f64>())?;
         let of_singles = room(input, blocks, tiers, size_of::<f32>())?;
         let start = start(input, edge);
-        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, of_singles, of_doubles, tiers })
+        let level = config.level;
+        Ok(Self { start, colour_transform: colour_transform.as_ref(), blocks, level, of_singles, of_doubles, tiers })
     }
 
     /// The numbers of blocks that memory has room for in a window.

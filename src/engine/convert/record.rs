@@ -2,12 +2,12 @@
 
 use super::coded_blocks::CodedBlocks;
 use super::coded_input::CodedInput;
-use super::warnings::{self, Findings};
+use super::gather::Reading;
+use super::warnings;
 use super::workers::CodedBlock;
 use super::{ConvertConfig, ConvertReport, Plan, ResumePoint, Target, WindowJob};
 use crate::file::promise::range_of_shares;
 use crate::file::report::{BoundReport, WindowReport};
-use crossbeam_channel::Receiver;
 use std::collections::HashMap;
 use std::io::Write;
 use std::iter::Peekable;
@@ -15,8 +15,6 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use wavesplat_core::base::description::{Description, extended, frames_of, joined, with_frames};
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::progress::Progress;
-use wavesplat_core::source::Archive;
 use wavesplat_format::{BlockId, EncodedBlock, Metadata, Window, WindowEnd, WindowRecord, Writer};
 
 pub(super) struct WindowWriter<'a, W: Write> {
@@ -26,7 +24,6 @@ pub(super) struct WindowWriter<'a, W: Write> {
     /// The file's writer, created when the first window gives the file its id.
     writer: Option<Writer<W>>,
     out: Option<W>,
-    /// The descriptions to store; empty once the file is finished.
     descriptions: Descriptions,
     /// The current window.
     window: Option<OpenWindow>,
@@ -106,25 +103,26 @@ impl OpenWindow {
     }
 }
 
-/// The description of the frames already in the file, and that of the added frames.
-#[derive(Default)]
+/// The description of the frames already in the file.
 struct Descriptions {
     before: Option<Description>,
-    added: Option<Description>,
+    /// Whether the file has a description.
+    is_told: bool,
 }
 
 impl Descriptions {
-    fn new(archive: &Archive, resume_from: Option<&ResumePoint>) -> Self {
+    fn new(resume_from: Option<&ResumePoint>) -> Self {
         let before = resume_from.and_then(|point| point.description.clone());
-        let is_told = resume_from.is_none_or(|point| point.complete.features().described);
-        Self { before, added: archive.description.clone().filter(|_| is_told) }
+        Self { before, is_told: resume_from.is_none_or(|point| point.complete.features().described) }
     }
 
-    /// The description of the whole file, and the names of the variables left out because some frames lack them.
-    fn joined(self, frames: u64) -> (Option<Description>, Vec<String>) {
-        let (Some(before), added) = (self.before, self.added.as_ref()) else { return (self.added, Vec::new()) };
+    /// The description of the whole file, from that of the added frames, and the names of the variables left out because some
+    /// frames lack them.
+    fn joined(&self, added: Option<Description>, frames: u64) -> (Option<Description>, Vec<String>) {
+        let added = added.filter(|_| self.is_told);
+        let Some(before) = self.before.clone() else { return (added, Vec::new()) };
         let before = with_frames(before, 1); // if there is no axis of frames, there is one
-        let added = added.map(|added| joined(before.clone(), &[with_frames(added.clone(), 1)]));
+        let added = added.map(|added| joined(before.clone(), &[with_frames(added, 1)]));
         let is_whole =
             |(all, _): &(Description, _)| frames_of(all).is_some_and(|d| all.dimensions[d as usize].length == frames);
         let (all, not_kept) = added.filter(is_whole).unwrap_or_else(|| extended(before, frames));
@@ -135,7 +133,7 @@ impl Descriptions {
 impl<'a, W: Write> WindowWriter<'a, W> {
     pub(super) fn new(input: &'a CodedInput, plan: &'a Plan<'a>, target: Target<'a, W>) -> Self {
         let (config, Target { name, out, resume_from }) = (&input.config, target);
-        let descriptions = Descriptions::new(&input.archive, resume_from.as_ref());
+        let descriptions = Descriptions::new(resume_from.as_ref());
         let frames_before = resume_from.as_ref().map_or(0, |point| point.complete.metadata().frames);
         let (writer, out) = match resume_from {
             Some(point) => (Some(Writer::resume(out, point.complete)), None),
@@ -144,21 +142,9 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         Self { name, config, plan, writer, out, descriptions, window: None, frames_before, busy: Duration::ZERO }
     }
 
-    /// Appends blocks until the workers end.
-    pub(super) fn write(&mut self, blocks: Receiver<CodedBlock>, progress: &dyn Progress) -> Result<()> {
-        for block in blocks {
-            let started = Instant::now();
-            progress.check()?;
-            let is_fine = block.coded.block.id.tier == 0;
-            self.append(block)?;
-            progress.advance(u64::from(is_fine));
-            self.busy += started.elapsed();
-        }
-        Ok(())
-    }
-
     /// Appends a block when it is its turn; after the last of a window, the window's end.
-    fn append(&mut self, CodedBlock { window: job, coded }: CodedBlock) -> Result<()> {
+    pub(super) fn append(&mut self, CodedBlock { window: job, coded }: CodedBlock) -> Result<()> {
+        let started = Instant::now();
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
         if let Some(out) = self.out.take() {
             self.writer = Some(Writer::with_features(out, job.id, &self.plan.start, job.features).map_err(failed)?);
@@ -174,6 +160,7 @@ impl<'a, W: Write> WindowWriter<'a, W> {
             writer.end_window(&window.end).map_err(failed)?;
             writer.out().flush().map_err(|e| Error::io(self.name, "writing", e))?;
         }
+        self.busy += started.elapsed();
         Ok(())
     }
 
@@ -181,8 +168,7 @@ impl<'a, W: Write> WindowWriter<'a, W> {
     pub(super) fn finish(
         mut self,
         started: Instant,
-        read: Duration,
-        findings: &Findings,
+        Reading { busy: read, findings, description }: Reading,
         encode: Duration,
     ) -> Result<ConvertReport> {
         let failed = |source| Error::CoefficientFile { path: self.name.into(), source };
@@ -191,12 +177,12 @@ impl<'a, W: Write> WindowWriter<'a, W> {
         };
         let last = Instant::now();
         let metadata = writer.metadata().clone();
-        let (description, not_kept) = std::mem::take(&mut self.descriptions).joined(metadata.frames);
+        let (description, not_kept) = self.descriptions.joined(description, metadata.frames);
         let (mut out, summary) = writer.finish_described(description.as_ref()).map_err(failed)?;
         out.flush().map_err(|e| Error::io(self.name, "writing", e))?;
         self.busy += last.elapsed();
         let report = self.report(&metadata, summary.bytes, [read, encode, self.busy, started.elapsed()]);
-        let warnings = warnings::warnings(self.config, &report, findings);
+        let warnings = warnings::warnings(self.config, &report, &findings);
         Ok(ConvertReport { typical_variation: findings.variation.median(), warnings, not_kept, ..report })
     }
 

@@ -2,7 +2,8 @@
 
 use super::coded_input::CodedInput;
 use super::plan::Plan;
-use super::{ConvertConfig, ConvertReport, ConvertRequest, ResumePoint, Target, convert_into, errors_of_results};
+use super::{Conversion, ConvertConfig, ConvertReport, ConvertRequest, ResumePoint, Target};
+use super::{convert_into, convert_together, errors_of_results};
 use crate::file::CoefficientFile;
 use crate::file::resume::{self, IfUnfinished};
 use std::path::{Path, PathBuf};
@@ -32,7 +33,7 @@ impl From<Error> for Failure {
 /// Returns no report if nothing was left to do: the run that is to be resumed had completed the file.
 ///
 /// # Errors
-/// Those of [`convert`](super::convert) and of [`ConvertRequest::check`]; also an error if `output` exists, or is
+/// Those of [`convert`](super::convert()) and of [`ConvertRequest::check`]; also an error if `output` exists, or is
 /// complete but with other settings or frames, or if `if_unfinished` says so.
 pub fn run(
     source: Box<dyn FrameSource>,
@@ -41,20 +42,88 @@ pub fn run(
     replace: bool,
     if_unfinished: IfUnfinished,
     progress: &dyn Progress,
-) -> std::result::Result<Option<ConvertReport>, Failure> {
-    let (mut source, config) = request.prepare(source)?;
-    if if_unfinished == IfUnfinished::Resume && !replace && output.is_file() {
-        check_complete(output, &config, source.archive())?;
-        return Ok(None);
+) -> Outcome {
+    let task = Task { source, request: request.clone(), output: output.into() };
+    run_together(vec![task], replace, if_unfinished, progress)?.pop().expect("one outcome for each task")
+}
+
+/// The report of a conversion; none if nothing was left to do.
+pub type Outcome = std::result::Result<Option<ConvertReport>, Failure>;
+
+/// A source, and the file to convert it to.
+pub struct Task {
+    /// The frames.
+    pub source: Box<dyn FrameSource>,
+    /// How they are converted. The settings of memory of all tasks that run together must be equal.
+    pub request: ConvertRequest,
+    /// The coefficient file.
+    pub output: PathBuf,
+}
+
+/// As [`run`], several conversions [side by side](convert_together). The outcomes are those of the tasks, in order.
+///
+/// # Errors
+/// What prevents one of them from beginning, or ends all of them.
+pub fn run_together(
+    tasks: Vec<Task>,
+    replace: bool,
+    if_unfinished: IfUnfinished,
+    progress: &dyn Progress,
+) -> std::result::Result<Vec<Outcome>, Failure> {
+    let begin = |task| Begun::new(task, replace, if_unfinished);
+    let mut all = tasks.into_iter().map(begin).collect::<Result<Vec<_>>>()?;
+    let conversions = all.iter_mut().filter_map(Begun::conversion).collect();
+    let results = convert_together(conversions, progress);
+    let mut results = match results {
+        Ok(results) => results.into_iter(),
+        Err(error) => {
+            let kept = all.iter().filter_map(|begun| kept(begun.out.as_ref()?, &error)).next();
+            return Err(Failure { kept, error });
+        }
+    };
+    let result = |begun: &Begun| begun.out.is_some().then(|| results.next().expect("one result for each conversion"));
+    let results: Vec<_> = all.iter().map(result).collect();
+    Ok(all.into_iter().zip(results).map(|(begun, result)| begun.finish(result)).collect())
+}
+
+/// A task whose output is open.
+struct Begun {
+    task: Task,
+    config: ConvertConfig,
+    /// None if the file is complete.
+    out: Option<Output>,
+    resume_from: Option<ResumePoint>,
+}
+
+impl Begun {
+    fn new(Task { source, request, output }: Task, replace: bool, if_unfinished: IfUnfinished) -> Result<Self> {
+        let (source, config) = request.prepare(source)?;
+        let task = Task { source, request, output };
+        if if_unfinished == IfUnfinished::Resume && !replace && task.output.is_file() {
+            check_complete(&task.output, &config, task.source.archive())?;
+            return Ok(Self { task, config, out: None, resume_from: None });
+        }
+        let (out, complete) = resume::open(&task.output, replace, if_unfinished)?;
+        let resume_from = complete.map(|complete| ResumePoint { complete, first_window: 0, description: None });
+        Ok(Self { task, config, out: Some(out), resume_from })
     }
-    let (out, complete) = resume::open(output, replace, if_unfinished)?;
-    let resume_from = complete.map(|complete| ResumePoint { complete, first_window: 0, description: None });
-    let target = Target { name: output, out, resume_from };
-    let report = finish(source.as_mut(), &config, target, progress, || Ok(()))?;
-    // What cannot be measured, such as a stream, is converted all the same.
-    let mut errors = || errors_of_results(&CoefficientFile::open(output)?, source.as_mut(), request.memory);
-    let results = if request.measures { errors().unwrap_or_default() } else { None };
-    Ok(Some(ConvertReport { results, ..report }))
+
+    /// The conversion; none if the file is complete.
+    fn conversion(&mut self) -> Option<Conversion<'_, &mut Output>> {
+        let target = Target { name: &self.task.output, out: self.out.as_mut()?, resume_from: self.resume_from.take() };
+        Some(Conversion { source: self.task.source.as_mut(), config: &self.config, target })
+    }
+
+    /// Gives the file its name if it was converted.
+    fn finish(self, result: Option<Result<ConvertReport>>) -> Outcome {
+        let (Some(result), Some(out)) = (result, self.out) else { return Ok(None) };
+        let Task { mut source, request, output } = self.task;
+        let report = commit(result, out, || Ok(()))?;
+        // What cannot be measured, such as a stream, is converted all the same.
+        let mut errors = || errors_of_results(&CoefficientFile::open(&output)?, source.as_mut(), request.memory);
+        let results = if request.measures { errors().unwrap_or_default() } else { None };
+        Ok(Some(ConvertReport { results, ..report }))
+    }
 }
 
 /// Adds frames to a finished file, in windows after its own. Its successor replaces it when it is complete, and only if
@@ -72,21 +141,18 @@ pub fn append(
     let (out, complete) = resume::open_successor(file, if_unfinished)?;
     let (first_window, description) = (file.metadata().windows.len(), file.description()?);
     let resume_from = Some(ResumePoint { complete, first_window, description });
-    let target = Target { name: file.path(), out, resume_from };
-    finish(source, config, target, progress, || file.check_unchanged())
+    let (name, mut out) = (file.path(), out);
+    let result = convert_into(source, config, Target { name, out: &mut out, resume_from }, progress);
+    commit(result, out, || file.check_unchanged())
 }
 
-/// Converts the remaining frames, and commits the output if `still` confirms that the file it replaces is unchanged.
-fn finish(
-    source: &mut dyn FrameSource,
-    config: &ConvertConfig,
-    target: Target<'_, Output>,
-    progress: &dyn Progress,
+/// Commits the output of a conversion if `still` confirms that the file it replaces is unchanged.
+fn commit(
+    result: Result<ConvertReport>,
+    out: Output,
     still: impl FnOnce() -> Result<()>,
 ) -> std::result::Result<ConvertReport, Failure> {
-    let Target { name, mut out, resume_from } = target;
-    let report = convert_into(source, config, Target { name, out: &mut out, resume_from }, progress);
-    let report = report.map_err(|error| Failure { kept: kept(&out, &error), error })?;
+    let report = result.map_err(|error| Failure { kept: kept(&out, &error), error })?;
     out.commit_if(|part| resume::check(part).and_then(|()| still()))?;
     Ok(report)
 }

@@ -36,18 +36,14 @@ struct Ended {
 ///
 /// A block begins with nodes of the block above it, so a tier begins when the one above it is finished. Blocks of a tier are finished
 /// in any order.
-pub(super) fn encode(
-    level: i32,
-    plan: &Plan<'_>,
-    blocks: &Receiver<NextBlock>,
-    out: &Sender<CodedBlock>,
-) -> Result<Duration> {
+pub(super) fn encode(plans: &[Plan<'_>], blocks: &Receiver<NextBlock>, out: &Sender<CodedBlock>) -> Result<Duration> {
     let (encoders, (ended, all_ended)) = (Encoders::default(), unbounded::<Ended>());
     rayon::in_place_scope(|scope| {
         let mut flight = Flight::new(all_ended, out);
-        let mut before: Option<(u32, u8)> = None;
+        let mut before = None;
         while let Some(NextBlock { window, block }) = flight.next(blocks)? {
-            let tier = (block.id.window, block.id.tier);
+            let plan = &plans[window.conversion];
+            let tier = (window.conversion, block.id.window, block.id.tier);
             if before.replace(tier).is_some_and(|before| before != tier) {
                 flight.land()?;
             }
@@ -55,7 +51,7 @@ pub(super) fn encode(
             let (ended, encoders) = (ended.clone(), &encoders);
             scope.spawn(move |_| {
                 let coded = catch_unwind(AssertUnwindSafe(|| {
-                    encode_next(|| Encoder::new(level), plan, encoders, &window, block)
+                    encode_next(|| Encoder::new(plan.level), plan, encoders, &window, block)
                 }));
                 let coded = coded.map(|coded| Ok(CodedBlock { window, coded: coded? }));
                 let _ = ended.send(Ended { number, coded }); // fails if the stage has returned with an error
@@ -169,7 +165,8 @@ fn encode_next(
     window: &WindowJob,
     BlockSamples { id, samples }: BlockSamples,
 ) -> Result<Encoded> {
-    let mut encoder = encoders.take().map_or_else(new, Ok).map_err(bug)?;
+    let idle = encoders.take().filter(|encoder| encoder.level() == plan.level);
+    let mut encoder = idle.map_or_else(new, Ok).map_err(bug)?;
     let samples = to_channel(plan.colour_transform, id, samples);
     let encoded = encode_block(&mut encoder, plan, window, id, samples);
     encoders.put(encoder);

@@ -9,6 +9,7 @@ use super::sibling_times::StepArrays;
 use super::steps::Choice;
 use super::{ArrayFile, FileArrays, Variable, minc, openpmd, vtkhdf};
 use crate::numbering;
+use crate::shared::offer::Offer;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes, State};
@@ -60,10 +61,10 @@ impl ArrayArchive {
         Ok((image.as_ref().map_or(all, |image| image.variables.clone()), image))
     }
 
-    /// The variables among which the user must choose; none if it is clear which one is meant.
-    pub(crate) fn undecided(&self) -> Result<Vec<wavesplat_core::source::VariableInfo>> {
+    /// The variables of the file.
+    pub(crate) fn offer(&self) -> Result<Offer> {
         let (all, image) = self.variables().map_err(|e| Error::input(&self.opener.path, e))?;
-        Ok(choose::undecided(&all, &self.wanted(image.as_ref())))
+        Ok(choose::offer(&all, &self.wanted(image.as_ref())))
     }
 
     /// What the file says of its arrays.

@@ -3,6 +3,7 @@
 use super::Variable;
 use super::steps::{self, Choice, STEP, grouped};
 use crate::shared::component;
+use crate::shared::offer::Offer;
 use std::collections::HashSet;
 use wavesplat_core::base::error::{Note, Remedy};
 use wavesplat_core::source::variables::{self, VariableAxis};
@@ -82,6 +83,9 @@ fn not_found(all: &[Variable], name: &str) -> String {
 /// The one variable that can be an archive, or of several the one that is wanted.
 pub(crate) fn only<'a>(all: &'a [Variable], wanted: &Wanted<'_>) -> Advised<Choice<'a>> {
     let mut volumes = volumes(all, wanted);
+    if let Some(at) = active(&volumes, wanted) {
+        return Ok(volumes.swap_remove(at));
+    }
     match volumes.len() {
         1 => Ok(volumes.remove(0)),
         0 => Err(format!("has no array of numbers with three axes; it has{}", listed(&grouped(all.iter()))).into()),
@@ -89,13 +93,19 @@ pub(crate) fn only<'a>(all: &'a [Variable], wanted: &Wanted<'_>) -> Advised<Choi
     }
 }
 
-/// The variables among which the user must choose; none if [`only`] finds the one.
-pub(crate) fn undecided(all: &[Variable], wanted: &Wanted<'_>) -> Vec<source::VariableInfo> {
+/// The variables that can be an archive, and whether the user must choose one because [`only`] does not find it.
+pub(crate) fn offer(all: &[Variable], wanted: &Wanted<'_>) -> Offer {
     let volumes = volumes(all, wanted);
-    if volumes.len() > 1 { volumes.iter().map(Choice::info).collect() } else { Vec::new() }
+    let is_undecided = volumes.len() > 1 && active(&volumes, wanted).is_none();
+    Offer { variables: volumes.iter().map(Choice::info).collect(), is_undecided }
 }
 
-/// The variables that can be an archive, or of several the one that is wanted.
+/// The place of the variable that is wanted of several.
+fn active(volumes: &[Choice<'_>], wanted: &Wanted<'_>) -> Option<usize> {
+    volumes.iter().position(|choice| choice.is_active(wanted.active))
+}
+
+/// The variables that can be an archive.
 fn volumes<'a>(all: &'a [Variable], wanted: &Wanted<'_>) -> Vec<Choice<'a>> {
     let bounds = bounds(all);
     let least = if all.iter().any(|v| v.lengths.len() > 2) { 3 } else { 2 };
@@ -110,10 +120,7 @@ fn volumes<'a>(all: &'a [Variable], wanted: &Wanted<'_>) -> Vec<Choice<'a>> {
     if wanted.has_one_step {
         volumes = volumes.into_iter().map(Choice::numbered).collect();
     }
-    match volumes.iter().position(|c| c.is_active(wanted.active)) {
-        Some(at) => vec![volumes.swap_remove(at)],
-        None => volumes,
-    }
+    volumes
 }
 
 /// Names of variables that other variables name as their coordinates.

@@ -11,4 +11,4 @@ use super::format::{Choices, Format, Reader};
 pub(crate) static FORMAT: Format = Format::new("NumPy arrays (.npz)", &["npz"], READER);
 
 const READER: Reader =
-    Reader::Frames(Ok(|path, options, _| read::describe(path, options)), Choices::Variables(read::undecided));
+    Reader::Frames(Ok(|path, options, _| read::describe(path, options)), Choices::Variables(read::offer));

@@ -4,6 +4,7 @@ use super::directory::{self, Member};
 use crate::npy::{self, Array};
 use crate::numbering;
 use crate::shared::deflated::{FileReader, Stream};
+use crate::shared::offer::Offer;
 use std::collections::BTreeMap;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -34,10 +35,10 @@ pub(super) fn describe(path: &Path, options: &OpenOptions) -> Result<FileHeader>
     Ok(FileHeader { variable, notes, ..FileHeader::plain(chosen.arrays[0].array.shape, parts) })
 }
 
-/// The arrays among which the user must choose; none if there is only one.
-pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
-    let variables = all(&FileBytes::open(path, Access::Read)?, &OpenOptions::default())?;
-    Ok(if variables.len() > 1 { variables.iter().map(Variable::info).collect() } else { Vec::new() })
+/// The arrays of a file.
+pub(super) fn offer(path: &Path) -> Result<Offer> {
+    let all = all(&FileBytes::open(path, Access::Read)?, &OpenOptions::default())?;
+    Ok(Offer { variables: all.iter().map(Variable::info).collect(), is_undecided: all.len() > 1 })
 }
 
 /// An array of the archive.

@@ -94,6 +94,29 @@ fn expand_one(input: &Path, options: &OpenOptions) -> Result<FrameFiles> {
     }
 }
 
+/// Whether a folder or a pattern stands for no file yet.
+pub(super) fn is_empty(input: &Path, options: &OpenOptions) -> bool {
+    if input.is_dir() {
+        let holds = |all: Vec<PathBuf>| all.iter().any(|path| is_list(path) || is_frame(path, options));
+        return metadata_file(input).is_none() && !visible_files(input).is_ok_and(holds);
+    }
+    let matches_none = |text: &str| glob::glob(text).is_ok_and(|mut found| found.next().is_none());
+    !input.exists() && input.to_str().is_some_and(matches_none)
+}
+
+/// Whether a file lists others.
+fn is_list(path: &Path) -> bool {
+    by_name(path).is_some_and(|format| matches!(format.reader, Reader::List(_)))
+}
+
+/// Whether a file of a folder is one of frames.
+fn is_frame(path: &Path, options: &OpenOptions) -> bool {
+    match by_name(path) {
+        Some(format) => options.dims.is_none() && format.holds_frames(),
+        None => options.dims.is_some(),
+    }
+}
+
 fn listed(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     if inputs.is_empty() {
         return Err(Error::setting("inputs", "no input was given"));
@@ -121,7 +144,8 @@ fn refuse_twice(paths: &[PathBuf]) -> Result<()> {
     }
 }
 
-fn is_pattern(path: &Path) -> bool {
+/// Whether a path that is not there is a pattern.
+pub(super) fn is_pattern(path: &Path) -> bool {
     path.to_string_lossy().contains(['*', '?', '['])
 }
 
@@ -173,11 +197,7 @@ fn directory(folder: &Path, options: &OpenOptions) -> Result<FrameFiles> {
         }
         _ => {}
     }
-    let frames = |p: &&PathBuf| match by_name(p) {
-        Some(format) => options.dims.is_none() && format.holds_frames(),
-        None => options.dims.is_some(),
-    };
-    let mut paths: Vec<PathBuf> = all.iter().filter(frames).cloned().collect();
+    let mut paths: Vec<PathBuf> = all.iter().filter(|path| is_frame(path, options)).cloned().collect();
     if paths.iter().any(|p| extension(p) == "pvti") {
         paths.retain(|p| extension(p) != "vti"); // the pieces
     }

@@ -9,10 +9,12 @@ mod axes_tests;
 #[cfg(test)]
 mod series_tests;
 mod stream;
+mod follow;
 
 use super::arrays::held::{self, NamedArrays};
 use super::format::{Choices, Format, Reader};
 use super::shared::extension::extension;
+use super::shared::offer::Offer;
 use super::{FORMATS, nifti, npy, raw, tif, zarr};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -49,6 +51,9 @@ use wavesplat_core::source::{Extent, FrameSource, OpenOptions, VariableInfo};
 /// }
 /// ```
 pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
+    if let Some(end) = &options.follow {
+        return follow::open(inputs, options, end);
+    }
     if let [only] = inputs
         && only == Path::new(STANDARD)
     {
@@ -67,13 +72,8 @@ fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Frame
     let inputs::Expanded { files, planes } = inputs::expand(inputs, options)?;
     let is_alone = files.paths.len() == 1;
     let open = |options: &OpenOptions| {
-        Series::open(&files, options, |path, extent| {
-            let mut header = describe(path, options, extent)?;
-            if !is_alone && of_file(path).is_some_and(|format| format.is(&npy::FORMAT) || format.is(&tif::FORMAT)) {
-                header.notes.retain(|note| note.remedy != Some(Remedy::Set("axes"))); // a frame in each file
-            }
-            Ok(header)
-        })
+        let read = if is_alone { describe } else { describe_frame };
+        Series::open(&files, options, |path, extent| read(path, options, extent))
     };
     match planes {
         Some(planes) => planes::stacked(&files.paths[0], options, planes, open),
@@ -87,14 +87,32 @@ fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn Frame
 /// # Errors
 /// Files that are absent, damaged or of a format that is not supported.
 pub fn undecided(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+    let Offer { variables, is_undecided } = offer(inputs, options)?;
+    Ok(if is_undecided { variables } else { Vec::new() })
+}
+
+/// The variables of the first file that [`OpenOptions::variable`] can choose; none of a stream, and of files whose only array has no name.
+///
+/// # Errors
+/// Those of [`undecided`].
+pub fn variables(inputs: &[PathBuf], options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+    offer(inputs, options).map(|offer| offer.variables)
+}
+
+/// The variables of the first file.
+fn offer(inputs: &[PathBuf], options: &OpenOptions) -> Result<Offer> {
     if options.variable.is_some()
         || !options.magnitude.is_empty()
         || options.dims.is_some()
         || inputs == [Path::new(STANDARD)]
     {
-        return Ok(Vec::new());
+        return Ok(Offer::default());
     }
-    choices(&inputs::expand(inputs, options)?.files.paths[0], options)
+    let first = match &options.follow {
+        Some(end) => follow::first_file(inputs, options, end)?,
+        None => inputs::expand(inputs, options)?.files.paths.into_iter().next(),
+    };
+    first.map_or(Ok(Offer::default()), |first| offer_of_file(&first, options))
 }
 
 /// Opens a stream of frames one after another: raw samples if `options` has dims, else one `.npy`, or one for each
@@ -176,13 +194,25 @@ fn describe(path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHe
     format.describe(path, options, extent)
 }
 
-/// The variables of a file among which the user must choose; none if it is clear which one is meant.
-fn choices(path: &Path, options: &OpenOptions) -> Result<Vec<VariableInfo>> {
+/// As [`describe`], for one of several files: each holds frames, so its axes are clear.
+fn describe_frame(path: &Path, options: &OpenOptions, extent: Extent) -> Result<FileHeader> {
+    let mut header = describe(path, options, extent)?;
+    if of_file(path).is_some_and(|format| format.is(&npy::FORMAT) || format.is(&tif::FORMAT)) {
+        header.notes.retain(|note| note.remedy != Some(Remedy::Set("axes")));
+    }
+    Ok(header)
+}
+
+/// The variables of a file.
+fn offer_of_file(path: &Path, options: &OpenOptions) -> Result<Offer> {
     match format_of(path, options)?.map(|format| &format.reader) {
-        Some(Reader::Arrays(Ok(open))) => open(path, options)?.undecided(),
-        Some(Reader::Frames(_, Choices::Variables(undecided))) => undecided(path),
-        Some(Reader::Frames(_, Choices::Components)) => Ok(components(path, options)),
-        _ => Ok(Vec::new()), // opening it says what is not built in
+        Some(Reader::Arrays(Ok(open))) => open(path, options)?.offer(),
+        Some(Reader::Frames(_, Choices::Variables(choice))) => choice(path),
+        Some(Reader::Frames(_, Choices::Components)) => {
+            let variables = components(path, options);
+            Ok(Offer { is_undecided: !variables.is_empty(), variables })
+        }
+        _ => Ok(Offer::default()), // opening it says what is not built in
     }
 }
 

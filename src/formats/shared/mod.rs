@@ -9,6 +9,7 @@ pub(crate) mod directions;
 pub(crate) mod extension;
 pub(crate) mod links;
 pub(crate) mod meaning;
+pub(crate) mod offer;
 pub(crate) mod pattern;
 pub(crate) mod pieces;
 pub(crate) mod relabelled;

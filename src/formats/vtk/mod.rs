@@ -16,5 +16,5 @@ const READER: Reader = Reader::Frames(
         let header = read::describe(path, options.variable.as_deref())?;
         relabelled(path, header, options.axes.as_deref())
     }),
-    Choices::Variables(read::undecided),
+    Choices::Variables(read::offer),
 );

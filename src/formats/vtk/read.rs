@@ -2,6 +2,7 @@
 
 use super::header::{VtkArray, VtkHeader, stored_type};
 use crate::shared::component::{self, Chosen};
+use crate::shared::offer::Offer;
 use crate::shared::pieces::{Piece, Pieces};
 use crate::shared::text::Words;
 use std::path::Path;
@@ -32,17 +33,15 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     Ok(described)
 }
 
-/// The arrays among which the user must choose; none if it is clear which one is meant.
-pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
+/// The arrays of a file.
+pub(super) fn offer(path: &Path) -> Result<Offer> {
     let header = VtkHeader::read(&FileBytes::open(path, Access::Read)?)?;
-    if !component::is_undecided(&header.names(), header.scalars.first().copied()) {
-        return Ok(Vec::new());
-    }
     let variable = |array: &VtkArray| {
         let sample = stored_type(&array.ty).map_or(array.ty.as_str(), |ty| ty.name());
         VariableInfo::volume(&array.name, sample, array.of.dims(header.points), array.components)
     };
-    Ok(header.arrays.iter().map(variable).collect())
+    let is_undecided = component::is_undecided(&header.names(), header.scalars.first().copied());
+    Ok(Offer { variables: header.arrays.iter().map(variable).collect(), is_undecided })
 }
 
 /// An array as text: all of it is one piece.

@@ -47,7 +47,7 @@ const READER: Reader = Reader::Frames(
         let header = read::describe(path, options.variable.as_deref())?;
         relabelled(path, header, options.axes.as_deref())
     }),
-    Choices::Variables(read::undecided),
+    Choices::Variables(read::offer),
 );
 
 const IMAGE: Writer = Writer {

@@ -2,6 +2,7 @@
 
 mod given;
 mod options;
+mod several;
 
 use super::results::results_text;
 use crate::{CommonArgs, InputArgs, RemoteArgs, advice, coefficient_name, note_text, spare_inputs};
@@ -13,37 +14,41 @@ use wavesplat_core::base::error::{Error, Note, Result};
 use wavesplat_core::base::output::{Output, STANDARD};
 use wavesplat_core::colour::TransferFunction;
 use wavesplat_core::source::FrameSource;
-use wavesplat_engine::convert::{Bound, ConvertReport, Failure, run as convert};
+use wavesplat_core::source::follow::Follow;
+use wavesplat_engine::convert::{Bound, ConvertReport, ConvertRequest, Failure, Outcome, Task, run as convert};
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::repack::{RepackReport, repack};
 use wavesplat_engine::file::resume::{self, IfUnfinished};
 use wavesplat_jobs::picture::colours_of_source;
 
-/// Converts one variable.
+/// Converts one variable or several, or rewrites a coefficient file.
 pub(crate) fn run(args: &ConvertArgs) -> Result<()> {
+    args.common.start()?;
     if let Some(file) = args.input.coefficients(&args.inputs, &RemoteArgs::default())? {
         return args.repack(&file);
     }
-    let mut request = args.request()?;
-    request.check()?;
-    let mut source = args.select.narrow(args.input.open(&args.inputs, &args.common)?)?;
-    args.check_output()?;
-    let missing_value = source.archive().missing_value(request.missing_value);
-    request.transfer_function = args.colours(source.as_mut(), missing_value)?;
-    let if_unfinished = IfUnfinished::from_flags(args.force, args.resume);
+    let args = &args.following()?;
+    match several::several(args)? {
+        Some(several) => several::run(&several),
+        None => only(args),
+    }
+}
+
+/// Converts one variable.
+fn only(args: &ConvertArgs) -> Result<()> {
+    let Task { source, request, output } = args.task()?;
     let progress = args.common.progress("convert", "blocks");
-    let done = convert(source, &request, &args.output, args.force, if_unfinished, &progress);
+    let done = convert(source, &request, &output, args.force, args.if_unfinished(), &progress);
     drop(progress); // clears its bar before notes are printed
-    let Some(done) = done.transpose() else {
-        args.common.note(format_args!("{}: is complete already", args.output.display()));
-        return Ok(());
-    };
-    let text =
-        |r: &ConvertReport| Some(results_text(r.results.as_ref()?, &request.keep.sides, r.promise.units.as_deref()));
-    let results = done.as_ref().ok().and_then(text);
-    report(done, request.bound, &args.output, &args.common)?;
-    results.iter().for_each(|results| args.common.detail(results));
-    Ok(())
+    args.report(done, &request, Files::One)
+}
+
+/// How many files a run writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Files {
+    One,
+    /// Notes on a file begin with its name, and leave out the seconds of the run.
+    Several,
 }
 
 /// Reports a finished conversion, or the unfinished file that a failed one left.
@@ -52,17 +57,21 @@ pub(crate) fn report(
     bound: Bound,
     output: &Path,
     common: &CommonArgs,
+    files: Files,
 ) -> Result<()> {
-    let report = done.map_err(|Failure { error, kept }| {
-        if let Some(part) = kept {
-            common
-                .note(format_args!("{}: the finished windows are kept; --resume continues after them", part.display()));
-        }
-        error
-    })?;
-    common.note(summary(&report, bound));
-    report.warnings.iter().for_each(|warning| common.note(format_args!("warning: {}", note_text(warning))));
+    let name = if files == Files::Several { format!("{}: ", output.display()) } else { String::new() };
+    let report = done.map_err(|failure| error_of(failure, common))?;
+    common.note(format_args!("{name}{}", summary(&report, bound, files)));
+    report.warnings.iter().for_each(|warning| common.note(format_args!("{name}warning: {}", note_text(warning))));
     common.report(&Reported::new(&report), output == Path::new(STANDARD))
+}
+
+/// The error of a conversion. Notes the unfinished file that it left.
+fn error_of(Failure { error, kept }: Failure, common: &CommonArgs) -> Error {
+    if let Some(part) = kept {
+        common.note(format_args!("{}: the finished windows are kept; --resume continues after them", part.display()));
+    }
+    error
 }
 
 /// The keys of `--json`.
@@ -92,6 +101,48 @@ impl<'a> Reported<'a> {
 const OF_COEFFICIENTS: [&str; 4] = ["output", "force", "chain", "level"];
 
 impl ConvertArgs {
+    /// These options, with the run that is followed.
+    fn following(&self) -> Result<Self> {
+        let mut args = self.clone();
+        let Some(end) = &self.follow else { return Ok(args) };
+        if self.shard.is_some() || self.scan.is_some() {
+            return Err(Error::usage("--follow: shards and scans are of runs that have ended"));
+        }
+        self.common.note(format_args!("waits for frames until {end}"));
+        args.input.follow = Some(Follow::new(end.clone()));
+        Ok(args)
+    }
+
+    /// The frames to convert, how, and the output.
+    fn task(&self) -> Result<Task> {
+        let mut request = self.request()?;
+        request.check()?;
+        let mut source = self.select.narrow(self.input.open(&self.inputs, &self.common)?)?;
+        self.check_output()?;
+        let missing_value = source.archive().missing_value(request.missing_value);
+        request.transfer_function = self.colours(source.as_mut(), missing_value)?;
+        Ok(Task { source, request, output: self.output.clone() })
+    }
+
+    fn if_unfinished(&self) -> IfUnfinished {
+        IfUnfinished::from_flags(self.force, self.resume)
+    }
+
+    /// Reports a conversion, and the errors of results if they were measured.
+    fn report(&self, outcome: Outcome, request: &ConvertRequest, files: Files) -> Result<()> {
+        let Some(done) = outcome.transpose() else {
+            self.common.note(format_args!("{}: is complete already", self.output.display()));
+            return Ok(());
+        };
+        let text = |r: &ConvertReport| {
+            Some(results_text(r.results.as_ref()?, &request.keep.sides, r.promise.units.as_deref()))
+        };
+        let results = done.as_ref().ok().and_then(text);
+        report(done, request.bound, &self.output, &self.common, files)?;
+        results.iter().for_each(|results| self.common.detail(results));
+        Ok(())
+    }
+
     /// An error if the output would replace an input, or has the extension of a format of frames, which would mislead
     /// readers of the file.
     fn check_output(&self) -> Result<()> {
@@ -136,10 +187,13 @@ impl ConvertArgs {
     }
 }
 
-fn summary(r: &ConvertReport, bound: Bound) -> String {
+fn summary(r: &ConvertReport, bound: Bound, files: Files) -> String {
     let ratio = r.input_bytes as f64 / r.output_bytes as f64;
     let new = (r.frames - r.frames_before) as f64 / r.frames as f64;
-    let rate = new * r.input_bytes as f64 / r.seconds / 1e6;
+    let speed = match files {
+        Files::One => speed(new * r.input_bytes as f64, r.seconds),
+        Files::Several => String::new(),
+    };
     let unit = r.promise.units.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
     let errors = match bound {
         Bound::Pointwise => format!("largest error {:.4e} of {:.4e}{unit} allowed", r.reached, r.delta),
@@ -158,7 +212,12 @@ fn summary(r: &ConvertReport, bound: Bound) -> String {
     let estimate = r.promise.caution();
     let before = if r.frames_before > 0 { format!(", {} of them from before", r.frames_before) } else { String::new() };
     format!(
-        "{} frames{before}, {} -> {} bytes ({ratio:.1}x) in {:.2} s ({rate:.0} MB/s); {:.4} coefficients per sample; {errors}{estimate}",
-        r.frames, r.input_bytes, r.output_bytes, r.seconds, r.coefficients_per_sample
+        "{} frames{before}, {} -> {} bytes ({ratio:.1}x){speed}; {:.4} coefficients per sample; {errors}{estimate}",
+        r.frames, r.input_bytes, r.output_bytes, r.coefficients_per_sample
     )
+}
+
+/// The seconds of a run, and the bytes that it took in each.
+fn speed(bytes: f64, seconds: f64) -> String {
+    format!(" in {seconds:.2} s ({:.0} MB/s)", bytes / seconds / 1e6)
 }

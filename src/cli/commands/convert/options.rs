@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::base::values::share;
+use wavesplat_core::source::follow::RunEnd;
 use wavesplat_core::wavelet::AnyBasis;
 use wavesplat_engine::convert::shard::Shard;
 use wavesplat_engine::convert::{BestFor, Bound, ConvertRequest, MaxError, MissingPolicy, SpatialPredictor};
@@ -25,6 +26,7 @@ Examples:
   wavesplat convert run.raw --dims 256x256x128x400 --dtype f32 -o run.wspl
   simulation | wavesplat convert - --dims 64x64x64 --dtype f32 -o run.wspl
   wavesplat convert frames/ -o run.wspl --resume
+  wavesplat convert frames/ -o run.wspl --follow 10min
   wavesplat convert frames/ -o coloured.wspl --transfer-function viridis
   wavesplat convert run.nc -o run_%n.wspl --variable u,v,w
   wavesplat convert old.wspl -o new.wspl
@@ -91,15 +93,20 @@ pub(crate) struct ConvertArgs {
     /// For --bound sampled: seed of the random pixels [default: 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     seed: Option<u64>,
+    /// Convert frames as they appear, until the run that writes them has ended: nothing new has come for a time like 10min, or a file
+    /// exists. Frames are in a folder, a pattern or a list, each file complete when it has stayed the same for two seconds; or in one
+    /// file of raw or NumPy frames that grows, or a named pipe
+    #[arg(long, value_name = "TIME|FILE", help_heading = "Input")]
+    pub(super) follow: Option<RunEnd>,
     #[command(flatten)]
     pub(super) select: SelectArgs,
     /// Convert only the I-th of N shards, each a run of whole windows; wavesplat merge joins them. Needs --scan,
     /// --range or --max-error
     #[arg(long, value_name = "I/N", help_heading = SHARDS)]
-    shard: Option<Shard>,
+    pub(super) shard: Option<Shard>,
     /// File written by wavesplat scan: the value range of all frames, which the tolerance refers to
     #[arg(long, value_name = "FILE", help_heading = SHARDS)]
-    scan: Option<PathBuf>,
+    pub(super) scan: Option<PathBuf>,
     /// Number of consecutive windows that may reuse the previous window's coding. A shard is a whole number of such
     /// chains, so a smaller number allows more shards but converts more slowly
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1024), help_heading = SHARDS)]

@@ -15,6 +15,7 @@ mod skeleton;
 use super::layout::{IMAGE_DATA, TYPES};
 use crate::shared::component::{self, Chosen};
 use crate::shared::directions::{Directions, Placed};
+use crate::shared::offer::Offer;
 use extent::Extent;
 use header::{VtiArray, VtiHeader};
 use image::VtiFile;
@@ -55,18 +56,16 @@ pub(super) fn describe(path: &Path, variable: Option<&str>) -> Result<FileHeader
     })
 }
 
-/// The arrays among which the user must choose; none if it is clear which one is meant.
-pub(super) fn undecided(path: &Path) -> Result<Vec<VariableInfo>> {
+/// The arrays of a file.
+pub(super) fn offer(path: &Path) -> Result<Offer> {
     let header = VtiFile::open(path)?.header;
     let points = header.whole.points().map_err(|e| Error::input(path, e))?;
-    if !component::is_undecided(&header.names(), header.active()) {
-        return Ok(Vec::new());
-    }
     let variable = |array: &VtiArray| {
         let sample = TYPES.stored(array.ty.as_str()).map_or(array.ty.as_str(), |ty| ty.name());
         VariableInfo::volume(&array.name, sample, array.of.dims(points), array.components)
     };
-    Ok(header.arrays().iter().map(variable).collect())
+    let is_undecided = component::is_undecided(&header.names(), header.active());
+    Ok(Offer { variables: header.arrays().iter().map(variable).collect(), is_undecided })
 }
 
 /// The array that is meant.

@@ -1,0 +1,163 @@
+//! Frames of a run are converted while it writes them, to the bytes of a conversion afterwards.
+
+use super::disturbed_job::write_two;
+use super::{Archive, Run, Work, npy};
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::Path;
+use std::process::Child;
+use std::time::{Duration, Instant};
+use wavesplat_format::CompletePrefix;
+
+fn archive() -> Archive {
+    Archive::smooth([12, 10, 8], 22)
+}
+
+/// A conversion that follows a run.
+fn follow(work: &Work, line: &str) -> Child {
+    let mut command = work.command("sh");
+    command.args(["-c", &format!("exec $WAVESPLAT convert {line} --window 8")]).spawn().unwrap()
+}
+
+fn end(child: Child) -> Run {
+    Run::of("follow", child.wait_with_output().unwrap())
+}
+
+/// Waits until a file has a number of complete windows.
+#[track_caller]
+fn wait_for_windows(work: &Work, name: &str, windows: usize) {
+    let started = Instant::now();
+    let has_them = || {
+        let found = fs::read(work.path(name)).ok()?;
+        Some(CompletePrefix::read(&found.as_slice()).ok()?.metadata().windows.len() >= windows)
+    };
+    while has_them() != Some(true) {
+        assert!(started.elapsed() < Duration::from_secs(60), "{name} has not {windows} windows");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Writes a frame as slow programs do: its name appears first, its bytes later.
+fn write_slowly(path: &Path, bytes: &[u8]) {
+    let mut file = fs::File::create(path).unwrap();
+    for part in bytes.chunks(bytes.len().div_ceil(3)) {
+        std::thread::sleep(Duration::from_millis(20));
+        file.write_all(part).unwrap();
+    }
+}
+
+#[test]
+fn files_of_a_folder_are_converted_as_they_appear() {
+    let (work, archive) = (Work::new(), archive());
+    let run = follow(&work, "frames -o run.wspl --follow done --region 1:11,0:10,2:8");
+    std::thread::sleep(Duration::from_millis(400)); // the folder is not there yet
+    work.write("frames/run.log", "it begins");
+    for frame in 0..archive.frames {
+        write_slowly(&work.path(format!("frames/f_{frame}.npy")), &archive.frame_npy(frame));
+        if frame == 11 {
+            wait_for_windows(&work, "run.wspl.part", 1); // with frames to come
+        }
+    }
+    work.write("done", "");
+    end(run).ok();
+    work.wavesplat("convert frames -o after.wspl --window 8 --region 1:11,0:10,2:8").ok();
+    assert!(work.read("run.wspl") == work.read("after.wspl"));
+}
+
+#[test]
+fn variables_of_a_run_are_converted_as_they_appear_and_resumed_after_it() {
+    let (work, archive) = (Work::new(), archive());
+    let (all, later) = (Work::new(), Work::new());
+    write_two(&all, &archive);
+    fs::create_dir(work.path("steps")).unwrap();
+    let give = |frame: usize| {
+        let name = format!("steps/step_{frame}.vtk");
+        write_slowly(&work.path(&name), &all.read(&name));
+    };
+    let mut run = follow(&work, "steps --variable all -o %n.wspl --follow 1h --dt 0.5");
+    (0..18).for_each(give);
+    wait_for_windows(&work, "twice.wspl.part", 2);
+    run.kill().unwrap();
+    run.wait().unwrap();
+    (18..archive.frames).for_each(give);
+    let line = "steps --variable all -o %n.wspl --window 8 --dt 0.5";
+    let resumed = work.wavesplat(&format!("convert {line} --resume")).ok();
+    assert!(resumed.message().contains("16 of them from before"), "{}", resumed.message());
+    later.shell(&format!("exec $WAVESPLAT convert {}/{line}", all.path("").display())).ok();
+    for name in ["wave.wspl", "twice.wspl"] {
+        assert!(work.read(name) == later.read(name), "{name}");
+    }
+}
+
+#[test]
+fn a_file_that_grows_is_read_until_nothing_comes() {
+    let (work, archive) = (Work::new(), archive());
+    let [x, y, z] = archive.dims;
+    for (name, bytes, options) in
+        [("a.npy", archive.npy(), String::new()), ("a.raw", archive.bytes(), format!("--dims {x}x{y}x{z} --dtype f32"))]
+    {
+        let mut file = OpenOptions::new().create(true).append(true).open(work.path(name)).unwrap();
+        let run = follow(&work, &format!("{name} -o run.wspl --force --follow 1.5s {options}"));
+        for part in bytes.chunks(bytes.len().div_ceil(5)) {
+            file.write_all(part).unwrap();
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        end(run).ok();
+        work.shell(&format!("$WAVESPLAT convert - -o piped.wspl --force --window 8 {options} < {name}")).ok();
+        assert!(work.read("run.wspl") == work.read("piped.wspl"), "{name}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_may_be_opened_by_a_program_for_each_frame() {
+    let (work, archive) = (Work::new(), archive());
+    work.shell("mkfifo frames.npy").ok();
+    let run = follow(&work, "frames.npy -o run.wspl --follow 1.5s");
+    for frame in 0..archive.frames {
+        work.write("one.npy", archive.frame_npy(frame));
+        work.shell("cat one.npy > frames.npy").ok();
+    }
+    end(run).ok();
+    archive.write_frames(&work, "frames");
+    work.shell("cat $(ls -v frames/*) | $WAVESPLAT convert - -o piped.wspl --window 8").ok();
+    assert!(work.read("run.wspl") == work.read("piped.wspl"));
+}
+
+#[test]
+fn what_cannot_be_followed_is_named() {
+    let (work, archive) = (Work::new(), archive());
+    archive.write_frames(&work, "frames");
+    work.write("done", "");
+    work.write("empty/run.log", "");
+    work.write("one.vti", "<VTKFile");
+    work.write("torn/f_0.npy", archive.frame_npy(0));
+    work.write("torn/f_1.npy", &archive.frame_npy(1)[..900]);
+    work.write("other/f_0.npy", archive.frame_npy(0));
+    work.write("other/f_1.npy", npy("<f4", "1, 2, 3", &[0; 24]));
+    for (input, words) in [
+        ("-", "standard input ends"),
+        ("frames one.vti", "takes one folder"),
+        ("empty", "had no complete frame"),
+        ("gone", "was not there"),
+        ("one.vti", "cannot be read while it grows"),
+        ("torn", "f_1.npy"),
+        ("other", "f_1.npy"),
+        ("frames --magnitude a,b", "have ended"),
+        ("frames --shard 1/2 --range 0,1", "have ended"),
+    ] {
+        work.wavesplat(&format!("convert {input} -o a.wspl --follow done")).fails_with(&["error", words]);
+    }
+    work.wavesplat("convert frames -o a.wspl --follow 90").fails(2, &["90s, 10min or 2h"]);
+    work.wavesplat("convert frames -o a.wspl --follow 0s").fails(2, &["--follow"]);
+}
+
+#[test]
+fn frames_that_come_out_of_order_are_refused() {
+    let (work, archive) = (Work::new(), archive());
+    (10..20).for_each(|frame| work.write(&format!("frames/f_{frame}.npy"), archive.frame_npy(frame)));
+    let run = follow(&work, "frames -o run.wspl --follow 1h");
+    wait_for_windows(&work, "run.wspl.part", 1);
+    work.write("frames/f_9.npy", archive.frame_npy(9));
+    end(run).fails(4, &["frames: ", "new ones come before"]);
+}
