@@ -86,6 +86,31 @@ fn sources_of_many_variables_share_the_memory_of_one() {
 }
 
 #[test]
+fn files_of_a_folder_are_described_as_one_data_set() {
+    let (work, archive) = (Work::new(), Archive::smooth([12, 10, 8], 16));
+    write_two(&work, &archive);
+    work.wavesplat("convert steps/ --variable all -o %n.wspl --dt 0.5").ok();
+    work.shell("mkdir run && mv twice.wspl wave.wspl run && echo finished > run/run.log").ok();
+    for inputs in ["run", "run/*.wspl", "run/twice.wspl run/wave.wspl"] {
+        let said = work.wavesplat(&format!("info {inputs}")).ok();
+        let words =
+            ["2 files, 2 variable(s)", "12 x 10 x 8 voxels", "16 frames, 0 to 7.5", "  twice  f32, ", "  wave   f32, "];
+        words.iter().for_each(|words| assert!(said.text().contains(words), "{words}: {}", said.text()));
+        let found = work.wavesplat(&format!("info {inputs} --json")).ok().json();
+        assert_eq!(found["variables"], serde_json::json!(["twice", "wave"]));
+        assert_eq!((&found["frames"], &found["files"][1]["frames"]), (&16.into(), &16.into()));
+    }
+    work.wavesplat("convert steps/ --variable wave -o run/part.wspl --frames 0:8").ok();
+    let mixed = work.wavesplat("info run").ok();
+    for words in ["3 files, 2 variable(s)", "different numbers of frames, at different times", "16 frames, 0 to 7.5"] {
+        assert!(mixed.text().contains(words), "{words}: {}", mixed.text());
+    }
+    work.wavesplat("info run --frames 0:2").fails(2, &["--frames is for frames"]);
+    work.write("run/torn.wspl", "WSPL");
+    work.wavesplat("info run").fails_with(&["torn.wspl"]);
+}
+
+#[test]
 fn a_magnitude_is_computed_from_its_components() {
     let (work, source) = (Work::new(), input("vti/vector.vti"));
     let component = |name: &str| {

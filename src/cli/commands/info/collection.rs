@@ -150,7 +150,8 @@ impl Collection {
         let [x, y, z] = file.dims;
         let dims = if self.dims.is_none() { format!(", {x} x {y} x {z} voxels") } else { String::new() };
         let frames = if self.frames.is_none() { format!(", {} frames", file.frames) } else { String::new() };
-        let times = file.span.as_ref().filter(|_| self.times.is_none()).map_or(String::new(), |span| format!(", {span}"));
+        let times =
+            file.span.as_ref().filter(|_| self.times.is_none()).map_or(String::new(), |span| format!(", {span}"));
         format!(
             "  {:width$}  {}{unit}{dims}{frames}{times}, {} bytes ({ratio:.1}x), {}: {}  [{}]\n",
             file.variable,

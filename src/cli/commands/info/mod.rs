@@ -2,6 +2,7 @@
 
 mod archive;
 mod coefficients;
+mod collection;
 mod description;
 mod made_by;
 mod variables;
@@ -14,18 +15,19 @@ use wavesplat_core::base::values::share;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_format::Keep;
 
-/// Describe a coefficient file: contents, error bound and errors; or an archive of frames, and how it is read
+/// Describe a coefficient file: contents, error bound and errors; several as one data set; or an archive of frames, and how it is read
 #[derive(Debug, Args)]
 #[command(before_help = "\
 Examples:
   wavesplat info run.wspl
   wavesplat info run.wspl --json | jq .windows
+  wavesplat info converted/
   wavesplat info run.nc
   wavesplat info frames/ --estimate
   wavesplat info frames/ --estimate 0.001
   wavesplat info frames/ --estimate --keep side=0.5")]
 pub(crate) struct InfoArgs {
-    /// A coefficient file, or frames as for convert
+    /// A coefficient file; several, or a folder of them, as one data set; or frames as for convert
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
     /// For frames: convert a few blocks, and estimate the size of the coefficient file at this tolerance [a table of
@@ -52,6 +54,11 @@ fn tolerance(text: &str) -> std::result::Result<f64, String> {
 
 pub(crate) fn run(args: &InfoArgs) -> Result<()> {
     args.common.start()?;
+    let several = collection::coefficient_files(&args.inputs)?;
+    if let Some(first) = several.first() {
+        args.refuse_for_coefficients(first)?;
+        return collection::run(&several, args.input.access(), &args.common);
+    }
     if let Some(file) = args.coefficients()? {
         return coefficients::run(&file, &args.common);
     }
