@@ -49,6 +49,7 @@ const ALLOWED_FILES: [(&str, &[&str]); 30] = [
         &[
             "core/base/workers.rs",
             "core/source/scan.rs",
+            "core/source/series.rs",
             "engine/file/check.rs",
             "engine/file/skip.rs",
             "engine/file/tiers.rs",

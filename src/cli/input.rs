@@ -12,7 +12,7 @@ use wavesplat_core::base::sample::SampleType;
 use wavesplat_core::source::follow::Follow;
 use wavesplat_core::source::{self, FrameSource, OpenOptions, RegularTimes, Selection, VariableInfo, with_times};
 use wavesplat_engine::file::CoefficientFile;
-use wavesplat_engine::file::setting;
+use wavesplat_engine::file::{setting, units};
 use wavesplat_formats as formats;
 use wavesplat_jobs::axes::Axes;
 use wavesplat_jobs::picture::is_coefficient_name;
@@ -230,7 +230,7 @@ impl InputArgs {
         let options = OpenOptions {
             dims_are_remembered: !self.describes_layout(),
             variable_is_remembered: self.variable.is_none(),
-            clock: Some(times::units(file)),
+            clock: Some(units(file.metadata())),
             times: times::given(self.times.as_ref(), self.dt)?,
             ..self.completed(file)?.options(common.stream_memory())
         };
@@ -257,7 +257,7 @@ impl InputArgs {
             return Err(Error::usage("the times of the file are from a list: --times gives those of the new frames"));
         }
         let Some(Numbers([start, step])) = remembered::<Pair>(file, times::TIMES)? else { return Ok(source) };
-        Ok(with_times(source, RegularTimes::new(start, step)?.after(*last, every), &times::units(file)))
+        Ok(with_times(source, RegularTimes::new(start, step)?.after(*last, every), &units(file.metadata())))
     }
 
     /// Whether an option that describes headerless data is given.

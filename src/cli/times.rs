@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::files;
-use wavesplat_core::source::{GivenTimes, RegularTimes, Units};
-use wavesplat_engine::file::{CoefficientFile, setting};
+use wavesplat_core::source::{GivenTimes, RegularTimes};
 
 /// `START,STEP`, or a file with a number for each frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,13 +104,6 @@ fn time(line: &[u8]) -> std::result::Result<Option<f64>, String> {
             number.map(Some).ok_or_else(|| format!("{shown:?} is no finite number"))
         }
     }
-}
-
-/// The units that a file has.
-pub(super) fn units(file: &CoefficientFile) -> Units {
-    let text = |name| setting(file.metadata(), name).map(String::from);
-    let [samples, times, space, calendar] = Units::SETTINGS.map(text);
-    Units { samples, times, space, calendar }
 }
 
 #[cfg(test)]

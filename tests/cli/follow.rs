@@ -108,6 +108,105 @@ fn a_file_that_grows_is_read_until_nothing_comes() {
     }
 }
 
+/// NetCDF files of one frame each, with times and attributes.
+fn write_netcdf(work: &Work, archive: &Archive) {
+    work.write("a.npy", archive.npy());
+    work.wavesplat("convert a.npy -o a.wspl --dt 0.25 --tolerance 0").ok();
+    fs::create_dir(work.path("all")).unwrap();
+    for frame in 0..archive.frames {
+        work.wavesplat(&format!("extract a.wspl -o all/f_{frame:02}.nc --frames {frame}")).ok();
+    }
+}
+
+#[test]
+fn descriptions_and_times_are_those_of_all_files() {
+    let (work, archive, all) = (Work::new(), archive(), Work::new());
+    write_netcdf(&all, &archive);
+    let give = |frames: std::ops::Range<usize>| {
+        let names = frames.map(|frame| format!("f_{frame:02}.nc"));
+        names.for_each(|name| work.write(&format!("all/{name}"), all.read(&format!("all/{name}"))));
+    };
+    give(0..18);
+    let mut run = follow(&work, "all -o run.wspl --follow done");
+    wait_for_windows(&work, "run.wspl.part", 2);
+    run.kill().unwrap();
+    run.wait().unwrap();
+    let run = follow(&work, "all -o run.wspl --follow done --resume");
+    give(18..archive.frames);
+    std::thread::sleep(Duration::from_millis(500));
+    work.write("done", "");
+    let run = end(run).ok();
+    assert!(run.message().contains("16 of them from before"), "{}", run.message());
+    work.wavesplat("convert all -o after.wspl --window 8").ok();
+    assert!(work.read("run.wspl") == work.read("after.wspl"));
+    assert_eq!(work.wavesplat("info run.wspl --json").ok().json()["times"][21], 5.25);
+}
+
+#[test]
+fn what_is_beside_raw_frames_is_no_frame() {
+    let (work, archive) = (Work::new(), archive());
+    (0..archive.frames).for_each(|frame| work.write(&format!("raw/f_{frame}.bin"), archive.frame_bytes(frame)));
+    let line = "raw --dims 12x10x8 --dtype f32";
+    let run = follow(&work, &format!("{line} -o raw/run.wspl --follow raw/done"));
+    wait_for_windows(&work, "raw/run.wspl.part", 2);
+    work.write("raw/done", "");
+    end(run).ok();
+    work.shell("mv raw/run.wspl . && rm raw/done").ok();
+    work.wavesplat(&format!("convert {line} -o after.wspl --window 8")).ok();
+    assert!(work.read("run.wspl") == work.read("after.wspl"));
+}
+
+#[test]
+fn an_array_that_has_its_full_length_from_the_start_is_read_at_the_end() {
+    let (work, archive) = (Work::new(), archive());
+    let whole = archive.npy();
+    let head = whole.len() - archive.bytes().len();
+    work.write("a.npy", [&whole[..head], &vec![0; whole.len() - head][..]].concat());
+    let run = follow(&work, "a.npy -o run.wspl --follow done");
+    std::thread::sleep(Duration::from_millis(500));
+    work.write("a.npy", &whole);
+    work.write("done", "");
+    end(run).ok();
+    work.wavesplat("convert a.npy -o after.wspl --window 8").ok();
+    assert!(work.read("run.wspl") == work.read("after.wspl"));
+}
+
+#[test]
+fn a_file_that_is_being_written_is_no_silence() {
+    let (work, archive) = (Work::new(), archive());
+    let run = follow(&work, "frames -o run.wspl --follow 2.5s");
+    (0..8).for_each(|frame| work.write(&format!("frames/f_{frame}.npy"), archive.frame_npy(frame)));
+    let bytes = archive.frame_npy(8);
+    let mut file = fs::File::create(work.path("frames/f_8.npy")).unwrap();
+    for part in bytes.chunks(bytes.len().div_ceil(4)) {
+        file.write_all(part).unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+    }
+    end(run).ok();
+    work.wavesplat("convert frames -o after.wspl --window 8").ok();
+    assert!(work.read("run.wspl") == work.read("after.wspl"));
+}
+
+#[test]
+fn files_that_change_after_they_were_read_are_named() {
+    let (work, archive) = (Work::new(), archive());
+    archive.write_frames(&work, "frames");
+    let run = follow(&work, "frames -o run.wspl --follow done");
+    wait_for_windows(&work, "run.wspl.part", 2);
+    work.write("frames/f_1.npy", archive.frame_npy(2));
+    work.write("done", "");
+    end(run).fails(4, &["f_1.npy"]);
+    assert!(!work.path("run.wspl").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_that_nobody_opens_ends_with_the_run() {
+    let work = Work::new();
+    work.shell("mkfifo frames.npy").ok();
+    work.wavesplat("convert frames.npy -o run.wspl --follow 1s").fails_with(&["frames.npy"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_pipe_may_be_opened_by_a_program_for_each_frame() {
@@ -145,11 +244,15 @@ fn what_cannot_be_followed_is_named() {
         ("other", "f_1.npy"),
         ("frames --magnitude a,b", "have ended"),
         ("frames --shard 1/2 --range 0,1", "have ended"),
+        ("frames --transfer-function viridis", "needs --range"),
+        ("frames --frames 2:4", "has an end"),
+        ("frames --spacing 0,1,1", "--spacing"),
     ] {
         work.wavesplat(&format!("convert {input} -o a.wspl --follow done")).fails_with(&["error", words]);
     }
     work.wavesplat("convert frames -o a.wspl --follow 90").fails(2, &["90s, 10min or 2h"]);
     work.wavesplat("convert frames -o a.wspl --follow 0s").fails(2, &["--follow"]);
+    work.wavesplat("convert frames -o a.wspl --follow 10m").fails(2, &["90s, 10min or 2h"]);
 }
 
 #[test]

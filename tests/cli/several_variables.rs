@@ -57,6 +57,21 @@ fn a_variable_that_cannot_be_converted_does_not_end_the_others() {
     assert!(work.read("twice.wspl") == work.read("alone.wspl"));
 }
 
+#[test]
+fn a_variable_that_some_frames_lack_is_named() {
+    let (work, archive) = (Work::new(), Archive::smooth([6, 5, 4], 4));
+    write_two(&work, &archive);
+    let mut renamed = work.read("steps/step_3.vtk");
+    let at = renamed.windows(13).position(|words| words == b"SCALARS twice").unwrap();
+    renamed[at + 8..at + 13].copy_from_slice(b"other");
+    work.write("steps/step_3.vtk", renamed);
+    let run = work.wavesplat("convert steps/ --variable all -o %n.wspl");
+    run.fails_with(&["step_3.vtk", "twice.wspl: not converted", "1 variable(s)"]);
+    assert_eq!(work.names(), ["steps", "wave.wspl"]);
+    work.wavesplat("convert steps/ --variable wave,twice -o b_%n.wspl").fails_with(&["step_3.vtk"]);
+    assert_eq!(work.names(), ["steps", "wave.wspl"]);
+}
+
 /// Chunks of Zarr arrays span more frames than a window, so each source keeps one for the next window.
 #[cfg(all(feature = "zarr", target_os = "linux"))]
 #[test]

@@ -8,7 +8,7 @@ use wavesplat_core::base::address::refuse_output;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::output::{STANDARD, part_of};
 use wavesplat_core::source::FrameSource;
-use wavesplat_engine::convert::{ConvertConfig, append};
+use wavesplat_engine::convert::append;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::merge::Shards;
 use wavesplat_engine::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
@@ -61,7 +61,6 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     if are_shards(&args.inputs)? {
         return args.append_shards(&file);
     }
-    let config = args.config(&file)?;
     let source = args.input.open_again(&file, &args.inputs, None, &args.common)?;
     if let (Some(asked), Some(all)) = (args.frames, source.archive().frames)
         && asked.begins_at_end(all)
@@ -71,13 +70,6 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     }
     let source = narrow(source, args.frames, None)?;
     let mut source = args.input.go_on_in_time(&file, source, args.frames.map_or(1, |frames| frames.step()))?;
-    match (source.archive().has_times(), !file.metadata().times.is_empty()) {
-        (true, false) => return Err(Error::usage("the new frames have times, but the file has none")),
-        (false, true) => {
-            return Err(Error::usage("the file has times, but the new frames have none; --times gives them"));
-        }
-        _ => {}
-    }
     spare_inputs(&args.inputs, &path)?;
     if !args.force && !part_of(&path).exists() && args.has_them(&file, source.as_mut())? {
         args.common.note(format_args!("{}: ends with these frames already", args.file.display()));
@@ -85,9 +77,9 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     }
     let if_unfinished = IfUnfinished::from_flags(args.force, args.resume);
     let progress = args.common.progress("convert", "blocks");
-    let done = append(source.as_mut(), &config, &file, if_unfinished, &progress);
+    let done = append(source.as_mut(), &file, args.common.memory.0, if_unfinished, &progress);
     drop(progress); // clears its bar before notes are printed
-    report(done, config.bound, &path, &args.common, Files::One)
+    report(done, file.metadata().bound, &path, &args.common, Files::One)
 }
 
 /// Whether all inputs are shards, which are copied; other coefficient files are sources like any other.
@@ -151,10 +143,5 @@ impl AppendArgs {
 
     fn is_streamed(&self) -> bool {
         self.inputs == [Path::new(STANDARD)]
-    }
-
-    fn config(&self, file: &CoefficientFile) -> Result<ConvertConfig> {
-        let config = ConvertConfig::from_file(file.metadata(), self.common.memory.0);
-        config.ok_or_else(|| Error::input(&self.file, "has no settings of its conversion, so nothing can be appended"))
     }
 }

@@ -3,9 +3,11 @@
 use crate::base::mapped::{Access, FileBytes, State};
 use std::collections::HashMap;
 use std::fmt;
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::mpsc::{Receiver, SendError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -27,22 +29,27 @@ impl FromStr for RunEnd {
 
     /// Reads a time, like `90s`, `10min` or `2h`, or else the path of a file.
     fn from_str(text: &str) -> Result<Self, String> {
-        let unit = UNITS
-            .iter()
-            .find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?.trim().parse::<f64>().ok()?, seconds)));
-        if text.is_empty() || text.parse::<f64>().is_ok() {
-            return Err("takes a time with its unit, like 90s, 10min or 2h, or the name of a file".into());
+        let wrong = || format!("{text:?}: takes a time, like 90s, 10min or 2h, or the name of a file");
+        let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+        let (number, unit) = text.split_at(digits);
+        if text.is_empty() || text.starts_with('-') {
+            return Err(wrong());
         }
-        let Some((number, seconds)) = unit else { return Ok(Self::File(text.into())) };
-        let silence = Duration::try_from_secs_f64(number * seconds).ok().filter(|silence| !silence.is_zero());
-        silence.map(Self::Silence).ok_or_else(|| format!("{text} is no time that can be waited for"))
+        let Ok(number) = number.parse::<f64>() else { return Ok(Self::File(text.into())) };
+        let seconds = UNITS.iter().find(|(name, _)| *name == unit.trim()).map(|(_, seconds)| number * seconds);
+        let is_name = unit.contains(|c: char| !c.is_alphabetic() && c != ' ');
+        match seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).filter(|time| !time.is_zero()) {
+            Some(time) => Ok(Self::Silence(time)),
+            None if is_name => Ok(Self::File(text.into())),
+            None => Err(wrong()),
+        }
     }
 }
 
 impl fmt::Display for RunEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Silence(time) => write!(f, "nothing new has come for {:?}", time),
+            Self::Silence(time) => write!(f, "nothing new has come for {time:?}"),
             Self::File(path) => write!(f, "{} exists", path.display()),
         }
     }
@@ -55,9 +62,17 @@ const SETTLED: Duration = Duration::from_secs(2);
 #[derive(Debug, Clone)]
 pub struct Follow {
     /// What ends the run.
-    pub end: RunEnd,
-    /// The states of files, and since when they have been in them.
-    files: Arc<Mutex<HashMap<PathBuf, (State, Instant)>>>,
+    end: RunEnd,
+    files: Arc<Mutex<Files>>,
+}
+
+/// What is known of the files of a run.
+#[derive(Debug, Default)]
+struct Files {
+    /// Their states, and since when they have been in them.
+    states: HashMap<PathBuf, (State, Instant)>,
+    /// When one of them was last seen to change.
+    changed: Option<Instant>,
 }
 
 impl Follow {
@@ -66,85 +81,141 @@ impl Follow {
         Self { end, files: Arc::default() }
     }
 
-    /// Whether a file has stayed the same for some time.
-    pub fn is_settled(&self, path: &Path) -> bool {
+    /// Whether a path is the file that ends the run.
+    pub fn is_end(&self, path: &Path) -> bool {
+        matches!(&self.end, RunEnd::File(end) if end.file_name() == path.file_name())
+    }
+
+    /// Whether a file is complete: it has stayed the same for some time, or another file says that the run has ended.
+    pub fn is_complete(&self, path: &Path, is_over: bool) -> bool {
+        if is_over && matches!(self.end, RunEnd::File(_)) {
+            return true;
+        }
         let (Ok(file), Ok(mut files)) = (FileBytes::open(path, Access::Read), self.files.lock()) else { return false };
         let (state, now) = (file.state(), Instant::now());
-        let known = files.entry(path.into()).or_insert((state, now));
-        if known.0 != state {
-            *known = (state, now);
+        let known = files.states.insert(path.into(), (state, now));
+        match known.filter(|(known, _)| *known == state) {
+            Some((_, since)) => {
+                files.states.insert(path.into(), (state, since));
+                since.elapsed() >= SETTLED
+            }
+            None => {
+                files.changed = Some(now);
+                false
+            }
         }
-        known.1.elapsed() >= SETTLED
+    }
+
+    /// Whether the run has ended, if nothing new was seen since `last`.
+    fn is_over(&self, last: Instant) -> bool {
+        match &self.end {
+            RunEnd::Silence(time) => {
+                let changed = self.files.lock().ok().and_then(|files| files.changed);
+                let is_silent = |since: Instant| since.elapsed() >= (*time).max(SETTLED);
+                is_silent(last) && changed.is_none_or(is_silent)
+            }
+            RunEnd::File(path) => path.exists(),
+        }
     }
 }
 
 /// The shortest time between two looks for something new.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(300);
 
-/// Waits for what a run writes.
-#[derive(Debug)]
-pub struct Watch {
-    end: RunEnd,
-    /// When something new was last seen.
-    last: Instant,
-}
+/// The longest time between two looks.
+const MOST_BETWEEN_LOOKS: Duration = Duration::from_secs(10);
 
-impl Watch {
-    /// Begins to watch a run.
-    pub fn new(end: RunEnd) -> Self {
-        Self { end, last: Instant::now() }
-    }
-
-    /// Looks until there is something, which is returned, or the run has ended. What came just before the end is seen, since `look`
-    /// is called once more after it, and told so.
-    ///
-    /// # Errors
-    /// Those of `look`.
-    pub fn wait_for<T, E>(&mut self, mut look: impl FnMut(bool) -> Result<Option<T>, E>) -> Result<Option<T>, E> {
-        loop {
-            let (is_over, began) = (self.is_over(), Instant::now());
-            if let Some(found) = look(is_over)? {
-                self.last = Instant::now();
-                return Ok(Some(found));
-            }
-            if is_over {
-                return Ok(None);
-            }
-            sleep(BETWEEN_LOOKS.max(10 * began.elapsed())); // large folders take long to list
+/// Looks until there is something, which is returned, or the run has ended. What came just before the end is seen, since `look`
+/// is called once more after it, and told so.
+///
+/// # Errors
+/// Those of `look`.
+pub fn wait_for<T, E>(follow: &Follow, mut look: impl FnMut(bool) -> Result<Option<T>, E>) -> Result<Option<T>, E> {
+    let last = Instant::now();
+    loop {
+        let (is_over, began) = (follow.is_over(last), Instant::now());
+        if let Some(found) = look(is_over)? {
+            return Ok(Some(found));
         }
-    }
-
-    fn is_over(&self) -> bool {
-        match &self.end {
-            RunEnd::Silence(time) => self.last.elapsed() >= *time,
-            RunEnd::File(path) => path.exists(),
+        if is_over && follow.is_over(last) {
+            return Ok(None);
         }
+        sleep((10 * began.elapsed()).clamp(BETWEEN_LOOKS, MOST_BETWEEN_LOOKS)); // large folders take long to list
     }
 }
 
-/// A file or pipe that a run writes to: it ends with the run.
+/// A file that a run writes to: it ends with the run.
 #[derive(Debug)]
 pub struct FollowedReader<R> {
     reader: R,
-    watch: Watch,
+    follow: Follow,
 }
 
 impl<R> FollowedReader<R> {
-    /// Reads on until the run has ended.
-    pub fn new(reader: R, end: RunEnd) -> Self {
-        Self { reader, watch: Watch::new(end) }
+    /// Reads on until the run has ended. The reader must not wait for more bytes.
+    pub fn new(reader: R, follow: Follow) -> Self {
+        Self { reader, follow }
     }
 }
 
 impl<R: Read> Read for FollowedReader<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let reader = &mut self.reader;
-        let found = self.watch.wait_for(|_| match reader.read(out) {
-            Ok(0) => Ok(None),
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(e) => Err(e),
-        });
+        let found = wait_for(&self.follow, |_| reader.read(out).map(|bytes| Some(bytes).filter(|bytes| *bytes > 0)));
         Ok(found?.unwrap_or(0))
+    }
+}
+
+/// Bytes that a pipe may hold before they are asked for.
+const PIPED: usize = 1 << 20;
+
+/// A named pipe, read by a thread of its own, since opening and reading it may wait for ever. Each end of a program's bytes is no end.
+#[derive(Debug)]
+pub struct NamedPipe {
+    pieces: Receiver<io::Result<Vec<u8>>>,
+    current: Vec<u8>,
+    at: usize,
+}
+
+impl NamedPipe {
+    /// Reads what programs write to the pipe, one after another.
+    pub fn open(path: PathBuf) -> Self {
+        let (to_reader, pieces) = sync_channel(1);
+        std::thread::spawn(move || while send_all(&path, &to_reader).is_ok() {});
+        Self { pieces, current: Vec::new(), at: 0 }
+    }
+}
+
+/// Sends what one program writes to a pipe; an error if nobody wants it.
+fn send_all(path: &Path, to: &SyncSender<io::Result<Vec<u8>>>) -> Result<(), SendError<io::Result<Vec<u8>>>> {
+    let mut pipe = match File::open(path) {
+        Ok(pipe) => pipe,
+        Err(error) => {
+            to.send(Err(error))?;
+            return Ok(sleep(BETWEEN_LOOKS));
+        }
+    };
+    loop {
+        let mut piece = vec![0; PIPED];
+        match pipe.read(&mut piece) {
+            Ok(0) => return Ok(()),
+            Ok(bytes) => piece.truncate(bytes),
+            Err(error) => return to.send(Err(error)),
+        }
+        to.send(Ok(piece))?;
+    }
+}
+
+impl Read for NamedPipe {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.at == self.current.len() {
+            let Ok(piece) = self.pieces.try_recv() else { return Ok(0) };
+            (self.current, self.at) = (piece?, 0);
+        }
+        let bytes = out.len().min(self.current.len() - self.at);
+        out[..bytes].copy_from_slice(&self.current[self.at..][..bytes]);
+        self.at += bytes;
+        Ok(bytes)
     }
 }
 
@@ -161,7 +232,8 @@ mod tests {
         assert_eq!(["90s", "1.5 min", "2h"].map(seconds), [90.0, 90.0, 7200.0]);
         assert_eq!("done".parse(), Ok(RunEnd::File("done".into())));
         assert_eq!("run/ends".parse(), Ok(RunEnd::File("run/ends".into())));
-        for wrong in ["", "90", "0s", "-1min", "1e300h", "nans"] {
+        assert_eq!("2024-01/done".parse(), Ok(RunEnd::File("2024-01/done".into())));
+        for wrong in ["", "90", "0s", "-1min", "10m", "30 sec", "1d"] {
             assert!(wrong.parse::<RunEnd>().is_err(), "{wrong}");
         }
     }
@@ -178,9 +250,9 @@ mod tests {
                 Ok(is_there.into())
             }
         }
-        let end = RunEnd::Silence(2 * BETWEEN_LOOKS);
+        let follow = Follow::new(RunEnd::Silence(Duration::from_millis(1)));
         let mut found = Vec::new();
-        FollowedReader::new(Slow(0), end).read_to_end(&mut found).expect("bytes");
+        FollowedReader::new(Slow(0), follow).read_to_end(&mut found).expect("bytes");
         assert_eq!(found, [2, 4, 6]);
     }
 
@@ -189,9 +261,26 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let done = folder.path().join("done");
         std::fs::write(&done, "").expect("writing");
-        let mut watch = Watch::new(RunEnd::File(done));
+        let follow = Follow::new(RunEnd::File(done));
         let mut left = vec![2, 1];
         let mut look = |is_over: bool| Ok::<_, ()>(left.pop().filter(|_| is_over));
-        assert_eq!([(); 3].map(|()| watch.wait_for(&mut look)), [Ok(Some(1)), Ok(Some(2)), Ok(None)]);
+        assert_eq!([(); 3].map(|()| wait_for(&follow, &mut look)), [Ok(Some(1)), Ok(Some(2)), Ok(None)]);
+    }
+
+    #[test]
+    fn a_file_that_changes_is_no_silence() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a");
+        let follow = Follow::new(RunEnd::Silence(Duration::from_millis(1)));
+        let begun = Instant::now();
+        let mut looks = 0;
+        let found = wait_for(&follow, |is_over| {
+            looks += 1;
+            if looks < 12 {
+                std::fs::write(&path, vec![0; looks]).expect("writing");
+            }
+            Ok::<_, ()>(follow.is_complete(&path, is_over).then_some(looks))
+        });
+        assert!(found.is_ok_and(|looks| looks > Some(12)) && begun.elapsed() > 12 * BETWEEN_LOOKS);
     }
 }

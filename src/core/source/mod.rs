@@ -214,12 +214,16 @@ impl Archive {
         }
     }
 
-    /// Whether the times of its first `frames` frames are these; true if neither has times.
+    /// Whether the times of its first `frames` frames, as far as they are known, are these; true if neither has times.
     pub fn begins_with_times(&self, times: &[f64], frames: usize) -> bool {
         let count = frames.min(self.frames.unwrap_or(usize::MAX));
         let own = self.times_of(0..count);
         let times = &times[..times.len().min(count)];
-        own.len() == times.len() && own.iter().zip(times).all(|(own, time)| own.to_bits() == time.to_bits())
+        let is_long = match self.frames {
+            Some(_) => own.len() == times.len(),
+            None => own.is_empty() == times.is_empty(), // more may come
+        };
+        is_long && own.iter().zip(times).all(|(own, time)| own.to_bits() == time.to_bits())
     }
 
     /// The times of the frames, and how they are written.

@@ -1,5 +1,7 @@
 //! Several files of any format as one archive.
 
+mod builder;
+
 use super::file_header::FileHeader;
 use super::frames::{Bytes, Frame, Frames};
 use super::layout::Shape;
@@ -10,6 +12,8 @@ use crate::base::description::{Description, Values, extended, is_of, joined};
 use crate::base::error::{Error, Note, Remedy, Result};
 use crate::base::grid::Grid;
 use crate::base::mapped::{Access, FileBytes};
+pub use builder::SeriesBuilder;
+use rayon::prelude::*;
 use std::mem;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -61,102 +65,28 @@ struct Decoded {
     data: Arc<SpillBuffer>,
 }
 
+/// Frames of a part, and the bytes that they are in.
+struct Found {
+    from: PartStart,
+    frames: Vec<usize>,
+    bytes: FoundBytes,
+}
+
+enum FoundBytes {
+    File(FileBytes),
+    Decoded(Arc<SpillBuffer>),
+    /// Empty: the frames from the first on that are packed together go there.
+    ToDecode(SpillBuffer),
+}
+
+/// The most parts that are decoded at a time: each takes some memory for it.
+const TOGETHER: usize = 4;
+
 /// A frame of a part, and the byte at which it begins where its samples are.
 #[derive(Clone, Copy)]
 struct PartStart {
     frame: usize,
     byte: u64,
-}
-
-/// Files that become an archive one after another.
-#[derive(Debug)]
-pub struct SeriesBuilder {
-    series: Series,
-    first: FileHeader,
-    /// The name of the first file for messages.
-    name: String,
-    /// The first file that is placed otherwise than the first of all.
-    placed_otherwise: Option<PathBuf>,
-    /// Why the times of a file are not on the clock of the first one.
-    timed_otherwise: Option<String>,
-    /// What later files say of their frames.
-    more: Vec<Option<Description>>,
-    options: OpenOptions,
-}
-
-impl SeriesBuilder {
-    /// Begins with the first of several files, or the only one.
-    pub fn begin(path: &Path, header: FileHeader, is_alone: bool, options: &OpenOptions) -> Self {
-        let mut first = on_grid_of_user(header, options);
-        if !is_alone || first.parts.len() > 1 {
-            first.stack_frames();
-        }
-        Self {
-            series: Series::starting_with(&mut first, options),
-            name: format!("the first frame ({})", path.display()),
-            first,
-            placed_otherwise: None,
-            timed_otherwise: None,
-            more: Vec::new(),
-            options: options.clone(),
-        }
-    }
-
-    /// Adds the next file.
-    ///
-    /// # Errors
-    /// It is unlike the first one.
-    pub fn add(&mut self, path: &Path, header: FileHeader) -> Result<()> {
-        let mut file = on_grid_of_user(header, &self.options);
-        let unlike = file.follows(&self.first, &self.name).map_err(|e| Error::input(path, e))?;
-        if unlike.grid {
-            self.placed_otherwise.get_or_insert_with(|| path.into());
-        }
-        if unlike.times {
-            file.drop_bounds_of_times();
-            if let Err(why) = times::onto_clock(&mut file, &self.first.units) {
-                self.timed_otherwise.get_or_insert_with(|| format!("{} {why}", path.display()));
-            }
-        }
-        file.stack_frames();
-        self.more.push(file.description.take());
-        self.series.take(&mut file);
-        Ok(())
-    }
-
-    /// The frames so far, before the times of the user take the place of their own.
-    pub fn so_far(&self) -> &Series {
-        &self.series
-    }
-
-    /// As [`Self::so_far`], to read them.
-    pub fn so_far_mut(&mut self) -> &mut Series {
-        &mut self.series
-    }
-
-    /// The times of the frames so far by their `files`; empty unless each has a finite one on the clock of the first file.
-    pub fn times<'a>(&'a self, files: &'a FrameFiles) -> &'a [f64] {
-        let (frames, own) = (self.series.archive.frames.unwrap_or(0), &self.series.archive.times);
-        let times = match (files.times.len() == frames, &self.timed_otherwise) {
-            (true, _) => &files.times,
-            (false, None) if own.len() == frames => own,
-            _ => return &[],
-        };
-        if times.iter().all(|time| time.is_finite()) { times } else { &[] }
-    }
-
-    /// The archive of `files`, which were added.
-    ///
-    /// # Errors
-    /// Options of the user that do not fit it.
-    pub fn finish(mut self, files: &FrameFiles) -> Result<Series> {
-        if let Some(path) = self.placed_otherwise {
-            let what = "the spacing and origin are those of the first file";
-            note_once(&mut self.series.archive.notes, format!("{what}; {} has others", path.display()));
-        }
-        self.series.describe_more(self.more);
-        self.series.finish(files, self.timed_otherwise, &self.options)
-    }
 }
 
 impl Series {
@@ -302,60 +232,91 @@ impl Series {
         note_once(&mut self.archive.notes, format!("{why}: frames are numbered"));
     }
 
-    /// Adds some frames of a part, ascending, to a window.
-    fn add(&mut self, part: usize, wanted: &[usize], window: &mut Frames, spool: &mut Spool) -> Result<()> {
+    /// Where some frames of a part, ascending, are or will be decoded to. `used` bytes of memory are taken.
+    fn find(&mut self, part: usize, wanted: &[usize], used: &mut usize, spool: &mut Spool) -> Result<Vec<Found>> {
+        if wanted.is_empty() {
+            return Ok(Vec::new());
+        }
         let Part { path, state, at, .. } = &self.parts[part];
-        let (path, state) = (path.clone(), *state);
         let together = match at {
             DataLocation::Byte(start) => {
-                let file = FileBytes::open(&path, self.access)?;
-                state.check(&path, &file.state())?;
+                let file = FileBytes::open(path, self.access)?;
+                state.check(path, &file.state())?;
                 let from = PartStart { frame: 0, byte: *start };
-                self.push(part, from, wanted, Bytes::File(file), window);
-                return Ok(());
+                return Ok(vec![Found { from, frames: wanted.to_vec(), bytes: FoundBytes::File(file) }]);
             }
             DataLocation::Decoded(decoder) => decoder.frames_per_chunk(),
         };
-        state.check_path(&path)?;
-        for wanted in wanted.chunk_by(|a, b| a / together == b / together) {
-            let first = wanted[0] - wanted[0] % together;
-            let room = self.memory.saturating_sub(window.memory());
-            let data = self.decoded(part, first, room, spool)?;
-            let file = Some((path.clone(), state));
-            let from = PartStart { frame: first, byte: 0 };
-            self.push(part, from, wanted, Bytes::SpillBuffer { data, file }, window);
+        state.check_path(path)?;
+        let groups = wanted.chunk_by(|a, b| a / together == b / together);
+        groups.map(|frames| self.find_decoded(part, frames, together, used, spool)).collect()
+    }
+
+    /// Where some of the frames that are packed together are decoded to: in memory if there is room.
+    fn find_decoded(
+        &mut self,
+        part: usize,
+        frames: &[usize],
+        together: usize,
+        used: &mut usize,
+        spool: &mut Spool,
+    ) -> Result<Found> {
+        let first = frames[0] - frames[0] % together;
+        let (from, frames) = (PartStart { frame: first, byte: 0 }, frames.to_vec());
+        if let Some(last) = self.last.as_ref().filter(|last| (last.part, last.first) == (part, first)) {
+            *used += last.data.memory();
+            return Ok(Found { from, frames, bytes: FoundBytes::Decoded(last.data.clone()) });
+        }
+        self.last = None;
+        let Part { path, stored, .. } = &self.parts[part];
+        let data = SpillBuffer::within(stored.bytes, self.memory.saturating_sub(*used), spool, path)?;
+        *used += data.memory();
+        Ok(Found { from, frames, bytes: FoundBytes::ToDecode(data) })
+    }
+
+    /// Adds frames of some parts, ascending, to a window. Packed ones are decoded on all threads.
+    fn add(&mut self, parts: &[(usize, Vec<usize>)], window: &mut Frames, spool: &mut Spool) -> Result<()> {
+        let mut used = window.memory();
+        let find = |(part, wanted): &(usize, Vec<usize>)| self.find(*part, wanted, &mut used, spool);
+        let mut found = parts.iter().map(find).collect::<Result<Vec<_>>>()?;
+        let (Some((first, _)), Some((last, _))) = (parts.first(), parts.last()) else { return Ok(()) };
+        let places = self.parts[*first..=*last].par_iter_mut().zip(&mut found);
+        let decoded: Vec<Result<()>> = places.map(|(part, found)| decode(part, found)).collect();
+        decoded.into_iter().collect::<Result<()>>()?;
+        for ((part, _), found) in parts.iter().zip(found) {
+            found.into_iter().for_each(|found| self.push(*part, found, window));
         }
         Ok(())
     }
 
-    /// Adds frames that are in some bytes.
-    fn push(&self, part: usize, from: PartStart, frames: &[usize], bytes: Bytes, window: &mut Frames) {
-        let Part { path, stored, frames: all, .. } = &self.parts[part];
-        for &index in frames {
+    /// An error if a file has changed since its header was read.
+    pub fn check_unchanged(&self) -> Result<()> {
+        self.parts.iter().try_for_each(|part| part.state.check_path(&part.path))
+    }
+
+    /// Adds frames that were found.
+    fn push(&mut self, part: usize, Found { from, frames, bytes }: Found, window: &mut Frames) {
+        let Part { path, stored, frames: all, state, at } = &self.parts[part];
+        for index in frames {
             let path = path.display();
             let name = if *all == 1 { path.to_string() } else { format!("{path}, frame {index}") };
             let offset = from.byte + stored.strides.first + (index - from.frame) as u64 * stored.strides.frame;
             window.frames.push(Frame { bytes: window.bytes.len(), offset, name });
         }
+        let file = Some((path.clone(), *state));
+        let bytes = match bytes {
+            FoundBytes::File(file) => Bytes::File(file),
+            FoundBytes::Decoded(data) => Bytes::SpillBuffer { data, file },
+            FoundBytes::ToDecode(data) => {
+                let data = Arc::new(data);
+                let is_group = matches!(at, DataLocation::Decoded(decoder) if decoder.frames_per_chunk() > 1);
+                if is_group && data.memory() <= self.kept {
+                    self.last = Some(Decoded { part, first: from.frame, data: data.clone() });
+                }
+                Bytes::SpillBuffer { data, file }
+            }
+        };
         window.bytes.push((bytes, stored.clone()));
-    }
-
-    /// The frames of a part from `first` on that are packed together, in memory if there is `room`.
-    fn decoded(&mut self, part: usize, first: usize, room: usize, spool: &mut Spool) -> Result<Arc<SpillBuffer>> {
-        if let Some(last) = self.last.as_ref().filter(|last| (last.part, last.first) == (part, first)) {
-            return Ok(last.data.clone());
-        }
-        self.last = None;
-        let Part { path, frames, stored, at, .. } = &mut self.parts[part];
-        let DataLocation::Decoded(decoder) = at else { unreachable!("only what is packed is decoded") };
-        let together = decoder.frames_per_chunk();
-        let mut data = SpillBuffer::within(stored.bytes, room, spool, path)?;
-        decoder.decode(path, first..(first + together).min(*frames), &mut data)?;
-        let data = Arc::new(data);
-        if together > 1 && data.memory() <= self.kept {
-            self.last = Some(Decoded { part, first, data: data.clone() });
-        }
-        Ok(data)
     }
 
     /// Closes the decoders of parts that the next window does not need.
@@ -378,6 +339,18 @@ impl Series {
         let first = self.starts.partition_point(|s| *s <= frames.start).saturating_sub(1);
         first..self.starts.partition_point(|s| *s < frames.end).max(first)
     }
+}
+
+/// Decodes what was not decoded yet of some frames of a part.
+fn decode(Part { path, frames, at, .. }: &mut Part, found: &mut [Found]) -> Result<()> {
+    let DataLocation::Decoded(decoder) = at else { return Ok(()) };
+    let together = decoder.frames_per_chunk();
+    for Found { from, bytes, .. } in found {
+        if let FoundBytes::ToDecode(data) = bytes {
+            decoder.decode(path, from.frame..(from.frame + together).min(*frames), data)?;
+        }
+    }
+    Ok(())
 }
 
 /// The error of a window that ends after the last of `all` frames.
@@ -403,11 +376,10 @@ impl FrameSource for Series {
         let mut window = Frames { shape: self.shape, bytes: Vec::new(), frames: Vec::new() };
         let mut spool = Spool::default();
         let parts = if count == 0 { 0..0 } else { self.parts_of(&(first..end)) };
-        for part in parts.clone() {
-            let wanted = self.wanted(part, (first..end).step_by(step));
-            if !wanted.is_empty() {
-                self.add(part, &wanted, &mut window, &mut spool)?;
-            }
+        let wanted = |part| (part, self.wanted(part, (first..end).step_by(step)));
+        let all: Vec<_> = parts.clone().map(wanted).collect();
+        for some in all.chunks(TOGETHER) {
+            self.add(some, &mut window, &mut spool)?;
         }
         self.close_files(parts.start..parts.end.saturating_sub(1).max(parts.start));
         Ok(Box::new(window))

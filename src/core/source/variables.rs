@@ -1,5 +1,6 @@
 //! The variables of a file, from which the user must choose one.
 
+use crate::base::stored::StoredType;
 use serde::Serialize;
 use std::fmt::{self, Display, Write};
 
@@ -33,6 +34,11 @@ pub struct VariableAxis {
 }
 
 impl VariableInfo {
+    /// Whether its type is one that samples can have.
+    pub fn has_samples(&self) -> bool {
+        StoredType::all().any(|ty| ty.name() == self.sample)
+    }
+
     /// One array of a volume with `dims` voxels along x, y, z.
     pub fn volume(name: &str, sample: &str, dims: [usize; 3], components: usize) -> Self {
         let axis = |(name, length): (&str, usize)| VariableAxis { name: name.into(), length };

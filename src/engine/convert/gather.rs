@@ -122,6 +122,17 @@ impl<'a> SourceReader<'a> {
         ended.unwrap_or(Ok(())).map(|()| Reading { busy, findings: reader.findings, description })
     }
 
+    /// An error unless the frames of a window that the file has have its times. Those of a run that goes on are not known before.
+    fn check_times(&self, Window { first_frame, frames, .. }: &Window) -> Result<()> {
+        let (first, frames) = (*first_frame as usize, *frames as usize);
+        let known = self.done.times.get(first..first + frames).unwrap_or_default();
+        let own = self.source.archive().times_of(self.reader.first()..self.reader.first() + frames);
+        match own.iter().map(|time| time.to_bits()).eq(known.iter().map(|time| time.to_bits())) {
+            true => Ok(()),
+            false => Err(Error::path(&self.done.name, "was begun with other times")),
+        }
+    }
+
     /// Reads the next window, and sends its blocks unless the file has it.
     fn read_window(&mut self, out: &Sender<NextBlock>) -> Result<Next> {
         let (started, full) = (Instant::now(), self.reader.config.window);
@@ -132,6 +143,7 @@ impl<'a> SourceReader<'a> {
         let index = self.index;
         self.index += 1;
         if let Some(known) = known {
+            self.check_times(known)?;
             self.reader.skip_done(window.as_ref(), known, &self.done)?;
             self.busy += started.elapsed();
             return Ok(Next::Window);

@@ -93,19 +93,22 @@ struct Begun {
     /// None if the file is complete.
     out: Option<Output>,
     resume_from: Option<ResumePoint>,
+    /// The notes on the source before it was read.
+    notes: Vec<Note>,
 }
 
 impl Begun {
     fn new(Task { source, request, output }: Task, replace: bool, if_unfinished: IfUnfinished) -> Result<Self> {
         let (source, config) = request.prepare(source)?;
+        let notes = source.archive().notes.clone();
         let task = Task { source, request, output };
         if if_unfinished == IfUnfinished::Resume && !replace && task.output.is_file() {
             check_complete(&task.output, &config, task.source.archive())?;
-            return Ok(Self { task, config, out: None, resume_from: None });
+            return Ok(Self { task, config, out: None, resume_from: None, notes });
         }
         let (out, complete) = resume::open(&task.output, replace, if_unfinished)?;
         let resume_from = complete.map(|complete| ResumePoint { complete, first_window: 0, description: None });
-        Ok(Self { task, config, out: Some(out), resume_from })
+        Ok(Self { task, config, out: Some(out), resume_from, notes })
     }
 
     /// The conversion; none if the file is complete.
@@ -118,7 +121,9 @@ impl Begun {
     fn finish(self, result: Option<Result<ConvertReport>>) -> Outcome {
         let (Some(result), Some(out)) = (result, self.out) else { return Ok(None) };
         let Task { mut source, request, output } = self.task;
-        let report = commit(result, out, || Ok(()))?;
+        let mut report = commit(result, out, || Ok(()))?;
+        let is_new = |note: &&Note| !self.notes.contains(note);
+        report.warnings.extend(source.archive().notes.iter().filter(is_new).cloned());
         // What cannot be measured, such as a stream, is converted all the same.
         let mut errors = || errors_of_results(&CoefficientFile::open(&output)?, source.as_mut(), request.memory);
         let results = if request.measures { errors().unwrap_or_default() } else { None };
@@ -127,17 +132,29 @@ impl Begun {
 }
 
 /// Adds frames to a finished file, in windows after its own. Its successor replaces it when it is complete, and only if
-/// it has not changed meanwhile.
+/// it has not changed meanwhile. They are coded with the file's settings, in `memory` bytes.
 ///
 /// # Errors
-/// Those of [`run`].
+/// Those of [`run`]; also a file without its settings, and frames with times if the file has none, or without them if it has some.
 pub fn append(
     source: &mut dyn FrameSource,
-    config: &ConvertConfig,
     file: &CoefficientFile,
+    memory: usize,
     if_unfinished: IfUnfinished,
     progress: &dyn Progress,
 ) -> std::result::Result<ConvertReport, Failure> {
+    let refused = |what: Note| Error::input(file.path(), what);
+    let Some(config) = &ConvertConfig::from_file(file.metadata(), memory) else {
+        return Err(refused("has no settings of its conversion, so nothing can be appended".into()).into());
+    };
+    match (source.archive().has_times(), !file.metadata().times.is_empty()) {
+        (true, false) => return Err(refused("has no times, but the new frames have some".into()).into()),
+        (false, true) => {
+            let what = "has times, but the new frames have none";
+            return Err(refused(Note::with(what, Remedy::Set("times"))).into());
+        }
+        _ => {}
+    }
     let (out, complete) = resume::open_successor(file, if_unfinished)?;
     let (first_window, description) = (file.metadata().windows.len(), file.description()?);
     let resume_from = Some(ResumePoint { complete, first_window, description });

@@ -37,6 +37,8 @@ pub(super) struct WindowsDone {
     /// Those of the file that is continued.
     pub(super) features: Option<Features>,
     pub(super) windows: Vec<Window>,
+    /// The times of their frames, if the file has times.
+    pub(super) times: Vec<f64>,
     /// [`ResumePoint::first_window`]
     pub(super) first_window: usize,
     pub(super) name: PathBuf,
@@ -66,6 +68,7 @@ impl WindowsDone {
             id: Some(complete.id()),
             features: Some(complete.features()),
             windows: held.windows.clone(),
+            times: held.times.clone(),
             first_window: *first_window,
             name: name.into(),
         })

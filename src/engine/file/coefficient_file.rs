@@ -21,7 +21,7 @@ use wavesplat_core::base::time_labels::TimeLabels;
 use wavesplat_core::codec::WindowCodec;
 use wavesplat_core::codec::coarse;
 use wavesplat_core::codec::decode::Block;
-use wavesplat_core::source::{CHANNELS, ColourTransform};
+use wavesplat_core::source::{CHANNELS, ColourTransform, Units};
 use wavesplat_format::{BlockEntry, BlockId, FileId, LeafEntry, Metadata, Reader, Storage, Window, from_bare};
 
 /// An open coefficient file; several threads may read it. Clones share what is open.
@@ -426,6 +426,13 @@ impl CoefficientFile {
 /// Bytes at the end of a file of `len` bytes that likely hold its metadata and the root of its directory.
 fn tail(len: u64) -> u64 {
     (len / 512).clamp(64 << 10, 4 << 20)
+}
+
+/// The units of a file's samples, times and places, and the calendar of its times.
+pub fn units(file: &Metadata) -> Units {
+    let text = |name| setting(file, name).map(String::from);
+    let [samples, times, space, calendar] = Units::SETTINGS.map(text);
+    Units { samples, times, space, calendar }
 }
 
 /// The times of a file's frames, and how they are written.

@@ -24,7 +24,7 @@ pub mod repack;
 pub mod resume;
 pub mod merge;
 
-pub use coefficient_file::{CoefficientFile, time_labels};
+pub use coefficient_file::{CoefficientFile, time_labels, units};
 pub(crate) use decoded::{BlockValues, DecodedBlock};
 pub use fetch::Prefetch;
 pub(crate) use keep::FramesDrawn;

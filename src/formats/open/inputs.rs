@@ -100,12 +100,12 @@ pub(super) fn is_empty(input: &Path, options: &OpenOptions) -> bool {
         let holds = |all: Vec<PathBuf>| all.iter().any(|path| is_list(path) || is_frame(path, options));
         return metadata_file(input).is_none() && !visible_files(input).is_ok_and(holds);
     }
-    let matches_none = |text: &str| glob::glob(text).is_ok_and(|mut found| found.next().is_none());
-    !input.exists() && input.to_str().is_some_and(matches_none)
+    let is_valid = |text: &str| glob::Pattern::new(text).is_ok();
+    !input.exists() && input.to_str().is_some_and(is_valid) && matching(input).is_err()
 }
 
 /// Whether a file lists others.
-fn is_list(path: &Path) -> bool {
+pub(super) fn is_list(path: &Path) -> bool {
     by_name(path).is_some_and(|format| matches!(format.reader, Reader::List(_)))
 }
 
@@ -113,8 +113,13 @@ fn is_list(path: &Path) -> bool {
 fn is_frame(path: &Path, options: &OpenOptions) -> bool {
     match by_name(path) {
         Some(format) => options.dims.is_none() && format.holds_frames(),
-        None => options.dims.is_some(),
+        None => options.dims.is_some() && !is_of_run(path, options),
     }
+}
+
+/// Whether a file is one that a run and its conversion need beside the frames.
+fn is_of_run(path: &Path, options: &OpenOptions) -> bool {
+    options.follow.as_ref().is_some_and(|follow| follow.is_end(path) || extension(path) == "part")
 }
 
 fn listed(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {

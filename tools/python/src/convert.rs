@@ -14,9 +14,10 @@ use std::sync::Arc;
 use wavesplat::Result;
 use wavesplat::base::memory::for_reading;
 use wavesplat::base::sample::SampleType;
-use wavesplat::convert::{ConvertRequest, run};
+use wavesplat::convert::{ConvertRequest, append, run};
 use wavesplat::file::merge::Shards;
 use wavesplat::file::resume::IfUnfinished;
+use wavesplat::file::{CoefficientFile, units};
 use wavesplat::formats::{self, NamedArrays, extension_of_frames};
 use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
 
@@ -58,6 +59,40 @@ impl Conversion {
     }
 }
 
+/// A file that frames are added to.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Appended {
+    path: PathBuf,
+    memory: usize,
+    resume: bool,
+    overwrite: bool,
+}
+
+impl Appended {
+    /// Opens frames and adds them. `open` may call Python; the times are put on the clock of the file.
+    fn run(
+        &self,
+        py: Python<'_>,
+        options: &OpenOptions,
+        open: impl FnOnce(Caller, &OpenOptions) -> Result<Box<dyn FrameSource>> + Send,
+        report: Option<&Py<PyAny>>,
+    ) -> PyResult<Converted> {
+        fork::refuse()?;
+        let if_unfinished = IfUnfinished::from_flags(self.overwrite, self.resume);
+        job::run(py, report, |progress, caller| {
+            let file = CoefficientFile::open(&self.path)?;
+            let clock = Some(units(file.metadata()));
+            let mut source = open(caller, &OpenOptions { clock, memory: for_reading(self.memory), ..options.clone() })?;
+            let mut notes: Vec<String> = source.archive().notes.iter().map(advice::of_note).collect();
+            let done = append(source.as_mut(), &file, self.memory, if_unfinished, progress);
+            let done = done.map_err(|failure| failure.error)?;
+            notes.extend(done.warnings.iter().map(advice::of_note));
+            Ok((Some(serde_json::to_string(&done).unwrap_or_default()), notes))
+        })
+    }
+}
+
 /// An error if a coefficient file would have the extension of another format.
 fn coefficient_name(path: &Path) -> PyResult<()> {
     let Some(extension) = extension_of_frames(path) else { return Ok(()) };
@@ -94,15 +129,42 @@ pub(crate) fn convert_frames(
     conversion: Conversion,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
-    let Layout { dims, name, sample, spacing, origin, times, time_unit, calendar } = layout;
-    let sample = SampleType::ALL.into_iter().find(|ty| ty.name() == sample);
-    let times = times.map(|times| GivenTimes::List(times.into()));
     let request = conversion.request()?;
-    let (dims, memory) = (Some(dims), for_reading(request.memory));
-    let placed = OpenOptions { dims, sample, spacing, origin, ..OpenOptions::default() };
-    let options = OpenOptions { times, time_unit, calendar, memory, ..placed };
-    let open = |caller| formats::open_named_stream(name, FrameReader::new(iterator, caller), &options);
+    let options = OpenOptions { memory: for_reading(request.memory), ..layout.options() };
+    let open = |caller| formats::open_named_stream(layout.name, FrameReader::new(iterator, caller), &options);
     conversion.run(py, &request, open, report.as_ref())
+}
+
+/// Adds frames that an iterator gives as bytes, x fastest, to a file.
+#[pyfunction]
+#[pyo3(signature = (iterator, layout, appended, report = None))]
+pub(crate) fn append_frames(
+    py: Python<'_>,
+    iterator: Py<PyAny>,
+    layout: Layout,
+    appended: Appended,
+    report: Option<Py<PyAny>>,
+) -> PyResult<Converted> {
+    let options = layout.options();
+    let open = |caller, options: &OpenOptions| {
+        formats::open_named_stream(layout.name, FrameReader::new(iterator, caller), options)
+    };
+    appended.run(py, &options, open, report.as_ref())
+}
+
+impl Layout {
+    fn options(&self) -> OpenOptions {
+        OpenOptions {
+            dims: Some(self.dims.clone()),
+            sample: SampleType::ALL.into_iter().find(|ty| ty.name() == self.sample),
+            spacing: self.spacing,
+            origin: self.origin,
+            times: self.times.clone().map(|times| GivenTimes::List(times.into())),
+            time_unit: self.time_unit.clone(),
+            calendar: self.calendar.clone(),
+            ..OpenOptions::default()
+        }
+    }
 }
 
 /// Which variable is converted.
@@ -137,6 +199,29 @@ pub(crate) fn convert_arrays(
         formats::open_arrays(Path::new(&name), &arrays, &options)
     };
     conversion.run(py, &request, open, report.as_ref())
+}
+
+/// Adds the frames of a variable of named arrays to a file.
+#[pyfunction]
+#[pyo3(signature = (arrays, attributes, read, chosen, appended, report = None))]
+pub(crate) fn append_arrays(
+    py: Python<'_>,
+    arrays: Vec<GivenArray<'_>>,
+    attributes: Vec<(String, GivenValues<'_>)>,
+    read: Py<PyAny>,
+    chosen: Chosen,
+    appended: Appended,
+    report: Option<Py<PyAny>>,
+) -> PyResult<Converted> {
+    let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<Vec<_>>>()?;
+    let attributes = given_attributes(&attributes)?;
+    let Chosen { source: name, variable, axes } = chosen;
+    let options = OpenOptions { variable, axes, ..OpenOptions::default() };
+    let open = |caller, options: &OpenOptions| {
+        let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
+        formats::open_arrays(Path::new(&name), &arrays, options)
+    };
+    appended.run(py, &options, open, report.as_ref())
 }
 
 /// Joins shards to one file, and returns a report as JSON.

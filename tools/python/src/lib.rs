@@ -22,7 +22,7 @@ mod _wavesplat {
     #[pymodule_export]
     use super::chunk::{check, decode, encode};
     #[pymodule_export]
-    use super::convert::{convert_arrays, convert_frames, merge};
+    use super::convert::{append_arrays, append_frames, convert_arrays, convert_frames, merge};
     #[pymodule_export]
     use super::errors::{BoundMissedError, ChangedError, DamagedError, InputError, UnsupportedError, WavesplatError};
     #[pymodule_export]

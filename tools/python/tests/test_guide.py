@@ -31,6 +31,30 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_whole_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data, times = smooth(), np.arange(40) * 4.0
+    for name, values in {"u": data, "v": 2 * data}.items():
+        ds = xr.Dataset({name: (("time", "z", "y", "x"), values)}, {"time": times})
+        ds.to_wavesplat(f"run_{name}.wspl", tolerance=0)
+    names = {}
+    exec(blocks("Whole runs")[0], names)
+    assert set(names["ds"].data_vars) == {"u", "v"}
+    assert np.array_equal(names["ds"].v.values, 2 * data)
+
+
+def test_parts_of_space(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data = smooth()
+    places = {name: 1 + 0.1 * np.arange(n) for name, n in zip("zyx", data.shape[1:], strict=True)}
+    whole = xr.Dataset({"u": (("time", "z", "y", "x"), data)}, {"time": np.arange(40) * 4.0, **places})
+    halves = slice(None, 9), slice(9, None)
+    for rank, (y, x) in enumerate((y, x) for y in halves for x in halves):
+        whole.isel(y=y, x=x).to_wavesplat(f"rank_{rank}.wspl", tolerance=0)
+    (code,) = [code for code in PAGE.read_text().split("`") if "rank_*" in code]
+    assert np.array_equal(eval(code, {"xr": xr}).u.values, data)
+
+
 def test_zarr(folder):
     pytest.importorskip("zarr")
     data = smooth((40, 16, 64, 64))

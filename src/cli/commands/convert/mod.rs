@@ -108,6 +108,14 @@ impl ConvertArgs {
         if self.shard.is_some() || self.scan.is_some() {
             return Err(Error::usage("--follow: shards and scans are of runs that have ended"));
         }
+        if self.transfer_function.is_some() && self.range.is_none() {
+            return Err(Error::usage("--follow: --transfer-function needs --range, since later values are not known"));
+        }
+        if let Some(frames) = self.select.frames
+            && frames.resolve(None)?.2.is_some()
+        {
+            return Err(Error::usage(format!("--follow: --frames {frames} has an end; a: and a::step go on")));
+        }
         self.common.note(format_args!("waits for frames until {end}"));
         args.input.follow = Some(Follow::new(end.clone()));
         Ok(args)

@@ -94,8 +94,8 @@ pub(crate) struct ConvertArgs {
     #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = ERROR_BOUND)]
     seed: Option<u64>,
     /// Convert frames as they appear, until the run that writes them has ended: nothing new has come for a time like 10min, or a file
-    /// exists. Frames are in a folder, a pattern or a list, each file complete when it has stayed the same for two seconds; or in one
-    /// file of raw or NumPy frames that grows, or a named pipe
+    /// exists. INPUTS is a folder, a pattern or a list, whose files are complete when they have stayed the same for two seconds; or a
+    /// file that raw frames are appended to, or a named pipe
     #[arg(long, value_name = "TIME|FILE", help_heading = "Input")]
     pub(super) follow: Option<RunEnd>,
     #[command(flatten)]

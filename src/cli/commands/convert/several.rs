@@ -1,11 +1,12 @@
 //! Several variables of an archive, each converted to a file of its own.
 
 use super::{ConvertArgs, Files, error_of, speed};
-use crate::InputArgs;
+use crate::{CommonArgs, InputArgs};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::source::VariableInfo;
 use wavesplat_engine::convert::{Task, run_together};
 
 /// The placeholder for a variable's name in the name of the output.
@@ -17,58 +18,66 @@ const ALL: &str = "all";
 /// Converts variables side by side, each as its own command would. One that fails does not end the others.
 pub(super) fn run(several: &Several) -> Result<()> {
     let started = Instant::now();
-    let (all, tasks) = several.tasks()?;
-    let (first, common) = (all[0], &all[0].common);
+    let (opened, mut failed) = several.open()?;
+    let (commands, tasks): (Vec<_>, Vec<_>) = opened.into_iter().unzip();
     let requests: Vec<_> = tasks.iter().map(|task| task.request.clone()).collect();
+    let common = &several.asked.common;
     let progress = common.progress("convert", "blocks");
-    let outcomes = run_together(tasks, first.force, first.if_unfinished(), &progress);
+    let outcomes = run_together(tasks, several.asked.force, several.asked.if_unfinished(), &progress);
     drop(progress); // clears its bar before notes are printed
     let outcomes = outcomes.map_err(|failure| error_of(failure, common))?;
     let bytes: u64 = outcomes.iter().filter_map(|outcome| Some(outcome.as_ref().ok()?.as_ref()?.input_bytes)).sum();
-    let mut failed = Vec::new();
-    for ((args, request), outcome) in all.iter().zip(&requests).zip(outcomes) {
+    for ((args, request), outcome) in commands.iter().zip(&requests).zip(outcomes) {
         failed.extend(args.report(outcome, request, Files::Several).err().map(|error| (&args.output, error)));
     }
-    let count = all.len() - failed.len();
-    common.note(format_args!("{count} variable(s){}", speed(bytes as f64, started.elapsed().as_secs_f64())));
-    let last = failed.pop();
-    failed.iter().for_each(|(output, error)| common.note(format_args!("{}: not converted: {error}", output.display())));
-    last.map_or(Ok(()), |(output, error)| {
-        common.note(format_args!("{}: not converted", output.display()));
-        Err(error)
-    })
+    if bytes > 0 {
+        let count = several.commands.len() - failed.len();
+        common.note(format_args!("{count} variable(s){}", speed(bytes as f64, started.elapsed().as_secs_f64())));
+    }
+    several.report(failed)
 }
 
 /// The commands for several variables.
 pub(super) struct Several {
+    /// The command that asks for all of them.
+    asked: ConvertArgs,
     commands: Vec<ConvertArgs>,
-    /// Whether they are of all variables, or else of those that were named.
-    are_all: bool,
 }
 
+/// Commands whose frames were opened, and the outputs of those that failed.
+type Opened<'a> = (Vec<(&'a ConvertArgs, Task)>, Vec<(&'a PathBuf, Error)>);
+
 impl Several {
-    /// The tasks of the commands, at least one. Of all variables, those that cannot be frames are left out, with a note.
-    fn tasks(&self) -> Result<(Vec<&ConvertArgs>, Vec<Task>)> {
-        let mut tasks = Vec::new();
+    /// Opens the frames of each variable. A variable that was named must have some; of all, those without frames fail alone.
+    fn open(&self) -> Result<Opened<'_>> {
+        let (mut opened, mut failed) = (Vec::new(), Vec::new());
         for args in &self.commands {
             match args.task() {
-                Err(Error::Input { what, .. }) if self.are_all => {
-                    let name = args.input.variable.as_deref().unwrap_or_default();
-                    args.common.note(format_args!("{name}: left out: {what}"));
-                }
-                task => tasks.push((args, task?)),
+                Ok(task) => opened.push((args, task)),
+                Err(error @ Error::Input { .. }) if self.are_all() => failed.push((&args.output, error)),
+                Err(error) => return Err(error),
             }
         }
-        match tasks.is_empty() {
-            true => Err(Error::usage("--variable: there is no variable that can be converted")),
-            false => Ok(tasks.into_iter().unzip()),
+        Ok((opened, failed))
+    }
+
+    fn are_all(&self) -> bool {
+        self.asked.input.variable.as_deref() == Some(ALL)
+    }
+
+    /// Names the outputs that failed. The last error is that of the command.
+    fn report(&self, mut failed: Vec<(&PathBuf, Error)>) -> Result<()> {
+        let Some((output, last)) = failed.pop() else { return Ok(()) };
+        for (output, error) in failed {
+            self.asked.common.note(format_args!("{}: not converted: {error}", output.display()));
         }
+        self.asked.common.note(format_args!("{}: not converted", output.display()));
+        Err(last)
     }
 }
 
 /// The commands for each of several variables; none if one is meant.
 pub(super) fn several(args: &ConvertArgs) -> Result<Option<Several>> {
-    let are_all = args.input.variable.as_deref() == Some(ALL);
     let Some(names) = names(args)? else { return Ok(None) };
     let in_turn = names.len();
     let mut outputs = BTreeSet::new();
@@ -83,7 +92,7 @@ pub(super) fn several(args: &ConvertArgs) -> Result<Option<Several>> {
         Ok(one)
     };
     let commands = names.into_iter().map(command).collect::<Result<_>>()?;
-    Ok(Some(Several { commands, are_all }))
+    Ok(Some(Several { asked: args.clone(), commands }))
 }
 
 /// A variable to convert.
@@ -105,8 +114,9 @@ fn names(args: &ConvertArgs) -> Result<Option<Vec<Chosen>>> {
         Some(ALL) => {
             let mut input = args.input.clone();
             input.variable = None;
-            let all = input.variables(&args.inputs, args.common.stream_memory())?;
-            let components = |variable: &wavesplat_core::source::VariableInfo| match variable.components {
+            let mut all = input.variables(&args.inputs, args.common.stream_memory())?;
+            all.retain(|variable| is_supported(variable, &args.common));
+            let components = |variable: &VariableInfo| match variable.components {
                 1 => vec![variable.name.clone()],
                 n => (0..n).map(|component| format!("{}[{component}]", variable.name)).collect(),
             };
@@ -121,6 +131,14 @@ fn names(args: &ConvertArgs) -> Result<Option<Vec<Chosen>>> {
         }
         _ => Ok(None),
     }
+}
+
+/// Whether a variable has samples of a supported type; if not, a note says so.
+fn is_supported(variable: &VariableInfo, common: &CommonArgs) -> bool {
+    if !variable.has_samples() {
+        common.note(format_args!("{}: left out, since {} is no type of samples", variable.name, variable.sample));
+    }
+    variable.has_samples()
 }
 
 /// The only variable of an archive.

@@ -13,7 +13,7 @@ With xarray, ``xr.open_dataset("run.wspl")`` opens a file lazily, and ``ds.to_wa
 import os as _os
 import sys as _sys
 
-from ._convert import convert, merge
+from ._convert import append, convert, merge
 from ._figure import Figure
 from ._file import File, open
 from ._typed import LookOptions, PictureOptions
@@ -47,6 +47,7 @@ __all__ = [
     "Viewer",
     "WavesplatError",
     "__version__",
+    "append",
     "convert",
     "merge",
     "open",

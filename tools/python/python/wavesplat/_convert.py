@@ -124,19 +124,64 @@ def convert(
         raise ValueError("variable, axes and shard are for a Dataset: an array is (time, z, y, x)")
     when = Times.of(times, text("time_unit", time_unit))
     frames = Frames.of(source, memory, missing)
-    layout = {
-        "dims": frames.dims,
-        "name": frames.name,
-        "sample": frames.sample,
-        "spacing": three("spacing", spacing),
-        "origin": three("origin", origin),
-        "times": when.numbers,
-        "time_unit": when.unit,
-        "calendar": when.calendar,
-    }
+    layout = _layout(frames, when, three("spacing", spacing), three("origin", origin))
     conversion = given.of_variable(None)
     with reporting(progress, "convert") as report:
         return told(*_wavesplat.convert_frames(frames.parts, layout, conversion, report))
+
+
+def append(
+    source: Any,
+    path: str | PathLike[str],
+    *,
+    variable: str | None = None,
+    axes: str | None = None,
+    times: Any = None,
+    time_unit: str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    memory: int = MEMORY,
+    progress: Progress = False,
+) -> dict[str, Any]:
+    """Adds later frames to a coefficient file, with the settings of its conversion, in windows after the existing ones.
+
+    Full windows are the same as if all frames had been converted at once. The work is done on a copy, which replaces the file
+    when it is complete: programs that read the old file are not disturbed, and an interrupted run loses nothing.
+
+    Args:
+        source: The frames, as for `convert`.
+        path: The ``.wspl`` file. For a Dataset with several variables, "%n" in it stands for the name of each.
+        variable: Which variable of a Dataset; the only one that has three axes by default.
+        axes: As for `convert`.
+        times: The time of each frame, for arrays: needed if the file has times. Dates go on the file's clock.
+        time_unit: The unit of ``times``, perhaps since a date.
+        resume: Whether to continue an unfinished run of this function.
+        overwrite: Whether to discard what an earlier run left unfinished.
+        memory: Bytes that the conversion may take.
+        progress: Whether to show progress, or a function of (done, all).
+
+    Returns:
+        The report, as ``wavesplat append --json`` prints it; one for each variable if there are several.
+
+    Raises:
+        ValueError: A setting is wrong, or an earlier run was not finished.
+        InputError: The frames do not fit the file, or only one of both has times.
+
+    """
+    appending = Appending(located(path), whole("memory", memory), bool(resume), bool(overwrite))
+    if _is_of_xarray(source):
+        from ._dataset import append_dataset
+
+        if times is not None or time_unit is not None:
+            raise ValueError("times: a Dataset has coordinates of its own; change those with assign_coords")
+        name, letters = text("variable", variable), text("axes", axes)
+        return append_dataset(source, appending, variable=name, axes=letters, progress=progress)
+    if variable is not None or axes is not None:
+        raise ValueError("variable and axes are for a Dataset: an array is (time, z, y, x)")
+    frames = Frames.of(source, memory, None)
+    layout = _layout(frames, Times.of(times, text("time_unit", time_unit)), None, None)
+    with reporting(progress, "append") as report:
+        return told(*_wavesplat.append_frames(frames.parts, layout, vars(appending), report))
 
 
 def merge(
@@ -170,6 +215,20 @@ def merge(
         names = [located(shard) for shard in shards]
         found: dict[str, Any] = json.loads(_wavesplat.merge(names, located(path), resume, overwrite, report))
     return found
+
+
+def _layout(frames: Frames, when: Times, spacing: Any, origin: Any) -> dict[str, Any]:
+    """The meaning and the positions of frames, as the native half takes them."""
+    return {
+        "dims": frames.dims,
+        "name": frames.name,
+        "sample": frames.sample,
+        "spacing": spacing,
+        "origin": origin,
+        "times": when.numbers,
+        "time_unit": when.unit,
+        "calendar": when.calendar,
+    }
 
 
 def settings_of(
@@ -207,6 +266,16 @@ class Allowed:
             "tolerance": None if tolerance is None else _number(tolerance),
             "max_error": None if error is None else _finite("max_error", error),
         }
+
+
+@dataclass(frozen=True)
+class Appending:
+    """A file that frames are added to."""
+
+    path: str
+    memory: int
+    resume: bool
+    overwrite: bool
 
 
 @dataclass(frozen=True)

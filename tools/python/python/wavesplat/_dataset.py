@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from . import _wavesplat
-from ._convert import Conversion, told
+from ._convert import Appending, Conversion, told
 from ._frames import _chunk, frames_together, little_endian
 from ._progress import Progress, reporting
 
@@ -36,21 +36,46 @@ def convert_dataset(
     """Converts a variable, or each of several to a file of its own."""
     dataset = _dataset(source)
     names = [variable] if variable is not None else _volumes(dataset)
-    if NAME not in conversion.path:
-        if len(names) != 1:
-            found = ", ".join(names) or "none"
-            raise ValueError(
-                f"a file holds one variable with three axes or more, and the dataset has {found}: name one as "
-                f"variable=..., or write each to a file of its own, as in 'run_{NAME}.wspl'"
-            )
-        return _one(dataset, names[0], conversion, axes, progress)
-    reports = {}
     for name in names:
         conversion.allowed.of_variable(name)  # so that none is written if one lacks an entry
-    for name in names:
-        of_name = replace(conversion, path=conversion.path.replace(NAME, name))
-        reports[name] = _one(dataset, name, of_name, axes, progress)
-    return reports
+
+    def one(name: str, path: str) -> dict[str, Any]:
+        settings = replace(conversion, path=path).of_variable(name)
+        return _one(dataset, name, axes, _wavesplat.convert_arrays, settings, conversion.request["memory"], progress)
+
+    return _each(names, conversion.path, one)
+
+
+def append_dataset(
+    source: xr.DataArray | xr.Dataset,
+    appending: Appending,
+    *,
+    variable: str | None,
+    axes: str | None,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Adds the frames of a variable to a file, or those of each of several to a file of its own."""
+    dataset = _dataset(source)
+    names = [variable] if variable is not None else _volumes(dataset)
+
+    def one(name: str, path: str) -> dict[str, Any]:
+        settings = vars(replace(appending, path=path))
+        return _one(dataset, name, axes, _wavesplat.append_arrays, settings, appending.memory, progress)
+
+    return _each(names, appending.path, one)
+
+
+def _each(names: list[str], path: str, one: Callable[[str, str], dict[str, Any]]) -> dict[str, Any]:
+    """Does something with the file of one variable, or with that of each."""
+    if NAME in path:
+        return {name: one(name, path.replace(NAME, name)) for name in names}
+    if len(names) != 1:
+        found = ", ".join(names) or "none"
+        raise ValueError(
+            f"a file holds one variable with three axes or more, and the dataset has {found}: name one as "
+            f"variable=..., or give each a file of its own, as in 'run_{NAME}.wspl'"
+        )
+    return one(names[0], path)
 
 
 def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
@@ -77,8 +102,15 @@ def _checked(name: Hashable) -> str:
 
 
 def _one(
-    dataset: xr.Dataset, name: str, conversion: Conversion, axes: str | None, progress: Progress
+    dataset: xr.Dataset,
+    name: str,
+    axes: str | None,
+    do: Callable[..., tuple[str | None, list[str]]],
+    settings: dict[str, Any],
+    memory: int,
+    progress: Progress,
 ) -> dict[str, Any]:
+    """Gives a variable to the native half, to convert it or to add its frames to a file."""
     if name not in dataset.data_vars:
         raise ValueError(f"variable: there is no {name!r}; the dataset has {', '.join(map(str, dataset.data_vars))}")
     dtype = dataset[name].dtype
@@ -86,7 +118,6 @@ def _one(
         raise ValueError(f"variable: {name!r} has values of type {dtype}, which are no samples; convert them by astype")
     encoded, attrs = _encoded(dataset, name)
     unlimited = set(dataset.encoding.get("unlimited_dims", ()))
-    memory = conversion.request["memory"]
     arrays = [_described(key, var, unlimited, memory, key == name) for key, var in encoded.items()]
 
     def read(array: str, ranges: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
@@ -94,9 +125,8 @@ def _one(
         return little_endian(np.asarray(part.values)).reshape(-1).view(np.uint8)
 
     chosen = {"source": f"dataset ({name})", "variable": name, "axes": axes}
-    of_name = conversion.of_variable(name)
     with reporting(progress, f"convert {name}") as report:
-        return told(*_wavesplat.convert_arrays(arrays, _attributes(attrs), read, chosen, of_name, report))
+        return told(*do(arrays, _attributes(attrs), read, chosen, settings, report))
 
 
 def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], dict[Hashable, Any]]:

@@ -70,12 +70,26 @@ def convert_frames(
     settings: Mapping[str, Any],
     report: _Report | None = None,
 ) -> tuple[str | None, list[str]]: ...
+def append_frames(
+    iterator: Iterator[_Bytes],
+    layout: Mapping[str, Any],
+    appended: Mapping[str, Any],
+    report: _Report | None = None,
+) -> tuple[str | None, list[str]]: ...
 def convert_arrays(
     arrays: Sequence[Mapping[str, Any]],
     attributes: Sequence[tuple[str, Any]],
     read: Callable[[str, Sequence[tuple[int, int]]], _Bytes],
     chosen: Mapping[str, Any],
     settings: Mapping[str, Any],
+    report: _Report | None = None,
+) -> tuple[str | None, list[str]]: ...
+def append_arrays(
+    arrays: Sequence[Mapping[str, Any]],
+    attributes: Sequence[tuple[str, Any]],
+    read: Callable[[str, Sequence[tuple[int, int]]], _Bytes],
+    chosen: Mapping[str, Any],
+    appended: Mapping[str, Any],
     report: _Report | None = None,
 ) -> tuple[str | None, list[str]]: ...
 def encode(samples: _Bytes, dims: Sequence[int], sample: str, request: str) -> bytes: ...
