@@ -71,12 +71,17 @@ fn alone((frames, config): &(Memory, ConvertConfig)) -> Vec<u8> {
     bytes
 }
 
+/// What conversions together did.
+struct Done {
+    outputs: Vec<Vec<u8>>,
+    /// Whether each succeeded.
+    is_ok: Vec<bool>,
+    /// The variable and the first frame of each window that was read.
+    read: Vec<(usize, usize)>,
+}
+
 /// Converts the variables together. Each continues the bytes that it has; one may fail in a window.
-fn together(
-    variables: &[(Memory, ConvertConfig)],
-    begun: &[Vec<u8>],
-    fails: Option<(usize, usize)>,
-) -> (Vec<Vec<u8>>, Vec<bool>, Vec<(usize, usize)>) {
+fn together(variables: &[(Memory, ConvertConfig)], begun: &[Vec<u8>], fails: Option<(usize, usize)>) -> Done {
     let read = Arc::new(Mutex::new(Vec::new()));
     let fails_at = |name| fails.filter(|(failing, _)| *failing == name).map(|(_, frame)| frame);
     let told = |(name, (frames, _)): (usize, &(Memory, ConvertConfig))| Told {
@@ -98,17 +103,17 @@ fn together(
         config,
         target: Target { name: Path::new("a.wspl"), out, resume_from: prefix.map(resume) },
     });
-    let done = convert_together(conversions.collect(), &Silent).unwrap().iter().map(Result::is_ok).collect();
+    let is_ok = convert_together(conversions.collect(), &Silent).unwrap().iter().map(Result::is_ok).collect();
     let read = read.lock().unwrap().clone();
-    (outputs, done, read)
+    Done { outputs, is_ok, read }
 }
 
 #[test]
 fn conversions_side_by_side_give_the_bytes_of_each_alone() {
     let variables = variables();
     let expected: Vec<Vec<u8>> = variables.iter().map(alone).collect();
-    let (found, done, read) = together(&variables, &vec![Vec::new(); variables.len()], None);
-    assert!(done.iter().all(|done| *done) && found == expected);
+    let Done { outputs, is_ok, read } = together(&variables, &vec![Vec::new(); variables.len()], None);
+    assert!(is_ok.iter().all(|is_ok| *is_ok) && outputs == expected);
     // No source is read twice, nor while another is behind it.
     let mut next = vec![0; variables.len()];
     for (name, first) in read {
@@ -126,8 +131,7 @@ fn conversions_side_by_side_go_on_where_each_ended() {
     let mut random = Random(5);
     for _ in 0..6 {
         let begun: Vec<_> = expected.iter().map(|all| all[..random.below(all.len())].to_vec()).collect();
-        let (found, ..) = together(&variables, &begun, None);
-        assert!(found == expected);
+        assert!(together(&variables, &begun, None).outputs == expected);
     }
 }
 
@@ -137,9 +141,10 @@ fn a_conversion_that_fails_does_not_end_the_others() {
     let expected: Vec<Vec<u8>> = variables.iter().map(alone).collect();
     for failing in 0..variables.len() {
         let frame = 2 * variables[failing].1.window; // in the third window
-        let (found, done, _) = together(&variables, &vec![Vec::new(); variables.len()], Some((failing, frame)));
+        let Done { outputs: found, is_ok, .. } =
+            together(&variables, &vec![Vec::new(); variables.len()], Some((failing, frame)));
         for (name, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            assert_eq!((done[name], found == expected), (name != failing, name != failing), "variable {name}");
+            assert_eq!((is_ok[name], found == expected), (name != failing, name != failing), "variable {name}");
         }
         let kept = CompletePrefix::read(&found[failing].as_slice()).unwrap();
         assert_eq!(kept.metadata().windows.len(), 2, "its windows before are complete");

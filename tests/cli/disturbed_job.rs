@@ -161,7 +161,7 @@ pub(super) fn write_two(work: &Work, archive: &Archive) {
         for (name, factor) in [("wave", 1.0), ("twice", 2.0)] {
             file.extend(format!("SCALARS {name} float 1\nLOOKUP_TABLE default\n").into_bytes());
             let values = &archive.values[frame * voxels..][..voxels];
-            file.extend(values.iter().flat_map(|value| (factor * value).to_be_bytes()));
+            file.extend(values.iter().flat_map(|value| (factor * value).to_le_bytes().into_iter().rev())); // big-endian
             file.push(b'\n');
         }
         work.write(&format!("steps/step_{frame}.vtk"), file);

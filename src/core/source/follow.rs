@@ -192,7 +192,8 @@ fn send_all(path: &Path, to: &SyncSender<io::Result<Vec<u8>>>) -> Result<(), Sen
         Ok(pipe) => pipe,
         Err(error) => {
             to.send(Err(error))?;
-            return Ok(sleep(BETWEEN_LOOKS));
+            sleep(BETWEEN_LOOKS);
+            return Ok(());
         }
     };
     loop {
