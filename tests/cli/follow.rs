@@ -151,9 +151,13 @@ fn what_is_beside_raw_frames_is_no_frame() {
     wait_for_windows(&work, "raw/run.wspl.part", 2);
     work.write("raw/done", "");
     end(run).ok();
-    work.shell("mv raw/run.wspl . && rm raw/done").ok();
+    work.shell("mv raw/run.wspl .").ok();
+    let pattern = format!("'raw/*' {} -o pattern.wspl --follow raw/done", &line[4..]);
+    end(follow(&work, &pattern)).ok();
+    work.shell("rm raw/done").ok();
     work.wavesplat(&format!("convert {line} -o after.wspl --window 8")).ok();
     assert!(work.read("run.wspl") == work.read("after.wspl"));
+    assert!(work.read("pattern.wspl") == work.read("after.wspl"));
 }
 
 #[test]
@@ -169,6 +173,51 @@ fn an_array_that_has_its_full_length_from_the_start_is_read_at_the_end() {
     end(run).ok();
     work.wavesplat("convert a.npy -o after.wspl --window 8").ok();
     assert!(work.read("run.wspl") == work.read("after.wspl"));
+}
+
+#[test]
+fn variables_end_with_the_same_frames() {
+    let (work, archive) = (Work::new(), archive());
+    write_two(&work, &archive);
+    let run = follow(&work, "steps --variable all -o %n.wspl --follow 2s");
+    wait_for_windows(&work, "twice.wspl.part", 2);
+    end(run).ok();
+    for name in ["wave", "twice"] {
+        assert_eq!(work.wavesplat(&format!("info {name}.wspl --json")).ok().json()["frames"], 22);
+    }
+}
+
+#[test]
+fn an_array_that_changes_is_no_silence() {
+    let (work, archive) = (Work::new(), archive());
+    let whole = archive.npy();
+    let head = whole.len() - archive.bytes().len();
+    work.write("a.npy", [&whole[..head], &vec![0; whole.len() - head][..]].concat());
+    let run = follow(&work, "a.npy -o run.wspl --follow 2.5s");
+    let mut file = OpenOptions::new().write(true).open(work.path("a.npy")).unwrap();
+    for part in whole.chunks(whole.len().div_ceil(4)) {
+        std::thread::sleep(Duration::from_millis(1500));
+        file.write_all(part).unwrap();
+    }
+    end(run).ok();
+    work.wavesplat("convert a.npy -o after.wspl --window 8").ok();
+    assert!(work.read("run.wspl") == work.read("after.wspl"));
+}
+
+#[test]
+fn a_list_that_changes_its_times_is_refused() {
+    let (work, archive) = (Work::new(), archive());
+    write_two(&work, &archive);
+    let list = |frames: usize, step: f64| {
+        let entry = |frame| format!("<DataSet timestep=\"{}\" file=\"steps/step_{frame}.vtk\"/>", step * frame as f64);
+        let entries: String = (0..frames).map(entry).collect();
+        work.write("a.pvd", format!("<VTKFile type=\"Collection\"><Collection>{entries}</Collection></VTKFile>"));
+    };
+    list(16, 1.0);
+    let run = follow(&work, "a.pvd --variable wave -o run.wspl --follow 1h");
+    wait_for_windows(&work, "run.wspl.part", 2);
+    list(22, 2.0);
+    end(run).fails(4, &["other times"]);
 }
 
 #[test]
@@ -211,16 +260,15 @@ fn a_pipe_that_nobody_opens_ends_with_the_run() {
 #[test]
 fn a_pipe_may_be_opened_by_a_program_for_each_frame() {
     let (work, archive) = (Work::new(), archive());
-    work.shell("mkfifo frames.npy").ok();
-    let run = follow(&work, "frames.npy -o run.wspl --follow 1.5s");
-    for frame in 0..archive.frames {
-        work.write("one.npy", archive.frame_npy(frame));
-        work.shell("cat one.npy > frames.npy").ok();
-    }
-    end(run).ok();
     archive.write_frames(&work, "frames");
     work.shell("cat $(ls -v frames/*) | $WAVESPLAT convert - -o piped.wspl --window 8").ok();
-    assert!(work.read("run.wspl") == work.read("piped.wspl"));
+    work.shell("mkfifo frames.npy").ok();
+    for (end_of_run, last) in [("1.5s", ""), ("done", "touch done")] {
+        let run = follow(&work, &format!("frames.npy -o run.wspl --force --follow {end_of_run}"));
+        work.shell(&format!("for f in $(ls -v frames/*); do cat $f > frames.npy; done; {last}")).ok();
+        end(run).ok();
+        assert!(work.read("run.wspl") == work.read("piped.wspl"), "{end_of_run}");
+    }
 }
 
 #[test]

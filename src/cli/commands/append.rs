@@ -6,12 +6,12 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::address::refuse_output;
 use wavesplat_core::base::error::{Error, Result};
-use wavesplat_core::base::output::{STANDARD, part_of};
+use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::FrameSource;
 use wavesplat_engine::convert::append;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_engine::file::merge::Shards;
-use wavesplat_engine::file::resume::{self, IfUnfinished, begins_with, ends_with, open_successor};
+use wavesplat_engine::file::resume::{self, IfUnfinished, begins_with, ends_with, is_begun, open_successor};
 use wavesplat_engine::file::shard::frames_of_shard;
 
 /// Add later frames to a coefficient file
@@ -71,7 +71,7 @@ pub(crate) fn run(args: &AppendArgs) -> Result<()> {
     let source = narrow(source, args.frames, None)?;
     let mut source = args.input.go_on_in_time(&file, source, args.frames.map_or(1, |frames| frames.step()))?;
     spare_inputs(&args.inputs, &path)?;
-    if !args.force && !part_of(&path).exists() && args.has_them(&file, source.as_mut())? {
+    if !args.force && !is_begun(&path) && args.has_them(&file, source.as_mut())? {
         args.common.note(format_args!("{}: ends with these frames already", args.file.display()));
         return Ok(());
     }

@@ -58,11 +58,16 @@ impl fmt::Display for RunEnd {
 /// A file is complete when its length and its time of change have stayed the same for so long, or the run has ended.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// How a run is followed. Copies share what they know of its files, so that several variables need not wait one after another.
+/// What cannot be read for so long is told.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// How a run is followed. Copies share what they know of it, so that several variables wait once, and end with the same files.
 #[derive(Debug, Clone)]
 pub struct Follow {
     /// What ends the run.
     end: RunEnd,
+    /// Tells the user why nothing is read.
+    tell: fn(&str),
     files: Arc<Mutex<Files>>,
 }
 
@@ -73,12 +78,41 @@ struct Files {
     states: HashMap<PathBuf, (State, Instant)>,
     /// When one of them was last seen to change.
     changed: Option<Instant>,
+    /// The number of files that the run ended with.
+    ended_with: Option<usize>,
+    /// Why nothing can be read, and since when; without a time once it was told.
+    unreadable: Option<(String, Option<Instant>)>,
 }
 
 impl Follow {
-    /// Follows a run until it ends.
-    pub fn new(end: RunEnd) -> Self {
-        Self { end, files: Arc::default() }
+    /// Follows a run until it ends. `tell` gets the reason if nothing can be read for long.
+    pub fn new(end: RunEnd, tell: fn(&str)) -> Self {
+        Self { end, tell, files: Arc::default() }
+    }
+
+    /// The number of files that the run ended with, once it has ended.
+    pub fn ended_with(&self) -> Option<usize> {
+        self.files.lock().ok().and_then(|files| files.ended_with)
+    }
+
+    /// Says that the run has ended with so many files, unless it has ended before.
+    pub fn end_with(&self, count: usize) {
+        if let Ok(mut files) = self.files.lock() {
+            files.ended_with.get_or_insert(count);
+        }
+    }
+
+    /// Takes note of an error that may pass, and tells it once if it lasts.
+    pub fn put_up_with(&self, error: &str) {
+        let Ok(mut files) = self.files.lock() else { return };
+        match &mut files.unreadable {
+            Some((known, since)) if known == error => {
+                if since.take_if(|since| since.elapsed() >= PATIENCE).is_some() {
+                    (self.tell)(error);
+                }
+            }
+            other => *other = Some((error.into(), Some(Instant::now()))),
+        }
     }
 
     /// Whether a path is the file that ends the run.
@@ -109,6 +143,7 @@ impl Follow {
     /// Whether the run has ended, if nothing new was seen since `last`.
     fn is_over(&self, last: Instant) -> bool {
         match &self.end {
+            _ if self.ended_with().is_some() => true,
             RunEnd::Silence(time) => {
                 let changed = self.files.lock().ok().and_then(|files| files.changed);
                 let is_silent = |since: Instant| since.elapsed() >= (*time).max(SETTLED);
@@ -144,7 +179,7 @@ pub fn wait_for<T, E>(follow: &Follow, mut look: impl FnMut(bool) -> Result<Opti
     }
 }
 
-/// A file that a run writes to: it ends with the run.
+/// Bytes that a run writes: they end with the run.
 #[derive(Debug)]
 pub struct FollowedReader<R> {
     reader: R,
@@ -152,7 +187,7 @@ pub struct FollowedReader<R> {
 }
 
 impl<R> FollowedReader<R> {
-    /// Reads on until the run has ended. The reader must not wait for more bytes.
+    /// Reads on until the run has ended. The reader waits for a moment before it says that there is nothing.
     pub fn new(reader: R, follow: Follow) -> Self {
         Self { reader, follow }
     }
@@ -160,13 +195,32 @@ impl<R> FollowedReader<R> {
 
 impl<R: Read> Read for FollowedReader<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        let reader = &mut self.reader;
-        let found = wait_for(&self.follow, |_| reader.read(out).map(|bytes| Some(bytes).filter(|bytes| *bytes > 0)));
-        Ok(found?.unwrap_or(0))
+        let last = Instant::now();
+        loop {
+            let is_over = self.follow.is_over(last);
+            let bytes = self.reader.read(out)?;
+            if bytes > 0 || is_over {
+                return Ok(bytes);
+            }
+        }
     }
 }
 
-/// Bytes that a pipe may hold before they are asked for.
+/// A file that grows.
+#[derive(Debug)]
+pub struct GrowingFile(pub File);
+
+impl Read for GrowingFile {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let bytes = self.0.read(out)?;
+        if bytes == 0 {
+            sleep(BETWEEN_LOOKS);
+        }
+        Ok(bytes)
+    }
+}
+
+/// The most bytes that are read of a pipe at a time.
 const PIPED: usize = 1 << 20;
 
 /// A named pipe, read by a thread of its own, since opening and reading it may wait for ever. Each end of a program's bytes is no end.
@@ -210,7 +264,7 @@ fn send_all(path: &Path, to: &SyncSender<io::Result<Vec<u8>>>) -> Result<(), Sen
 impl Read for NamedPipe {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.at == self.current.len() {
-            let Ok(piece) = self.pieces.try_recv() else { return Ok(0) };
+            let Ok(piece) = self.pieces.recv_timeout(SETTLED) else { return Ok(0) };
             (self.current, self.at) = (piece?, 0);
         }
         let bytes = out.len().min(self.current.len() - self.at);
@@ -251,7 +305,7 @@ mod tests {
                 Ok(is_there.into())
             }
         }
-        let follow = Follow::new(RunEnd::Silence(Duration::from_millis(1)));
+        let follow = Follow::new(RunEnd::Silence(Duration::from_millis(1)), |_| ());
         let mut found = Vec::new();
         FollowedReader::new(Slow(0), follow).read_to_end(&mut found).expect("bytes");
         assert_eq!(found, [2, 4, 6]);
@@ -262,7 +316,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let done = folder.path().join("done");
         std::fs::write(&done, "").expect("writing");
-        let follow = Follow::new(RunEnd::File(done));
+        let follow = Follow::new(RunEnd::File(done), |_| ());
         let mut left = vec![2, 1];
         let mut look = |is_over: bool| Ok::<_, ()>(left.pop().filter(|_| is_over));
         assert_eq!([(); 3].map(|()| wait_for(&follow, &mut look)), [Ok(Some(1)), Ok(Some(2)), Ok(None)]);
@@ -272,7 +326,7 @@ mod tests {
     fn a_file_that_changes_is_no_silence() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a");
-        let follow = Follow::new(RunEnd::Silence(Duration::from_millis(1)));
+        let follow = Follow::new(RunEnd::Silence(Duration::from_millis(1)), |_| ());
         let begun = Instant::now();
         let mut looks = 0;
         let found = wait_for(&follow, |is_over| {
@@ -283,5 +337,14 @@ mod tests {
             Ok::<_, ()>(follow.is_complete(&path, is_over).then_some(looks))
         });
         assert!(found.is_ok_and(|looks| looks > Some(12)) && begun.elapsed() > 12 * BETWEEN_LOOKS);
+    }
+
+    #[test]
+    fn copies_share_the_end() {
+        let follow = Follow::new(RunEnd::Silence(Duration::from_secs(3600)), |_| ());
+        follow.clone().end_with(3);
+        follow.end_with(4);
+        assert_eq!(follow.ended_with(), Some(3));
+        assert_eq!(wait_for(&follow, |is_over| Ok::<_, ()>(None::<()>.filter(|()| is_over))), Ok(None));
     }
 }

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The files of an archive, in order.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub struct FrameFiles {
     /// The files, at least one, none twice.
     pub paths: Vec<PathBuf>,
@@ -234,9 +234,6 @@ impl Series {
 
     /// Where some frames of a part, ascending, are or will be decoded to. `used` bytes of memory are taken.
     fn find(&mut self, part: usize, wanted: &[usize], used: &mut usize, spool: &mut Spool) -> Result<Vec<Found>> {
-        if wanted.is_empty() {
-            return Ok(Vec::new());
-        }
         let Part { path, state, at, .. } = &self.parts[part];
         let together = match at {
             DataLocation::Byte(start) => {
@@ -279,9 +276,10 @@ impl Series {
         let mut used = window.memory();
         let find = |(part, wanted): &(usize, Vec<usize>)| self.find(*part, wanted, &mut used, spool);
         let mut found = parts.iter().map(find).collect::<Result<Vec<_>>>()?;
-        let (Some((first, _)), Some((last, _))) = (parts.first(), parts.last()) else { return Ok(()) };
-        let places = self.parts[*first..=*last].par_iter_mut().zip(&mut found);
-        let decoded: Vec<Result<()>> = places.map(|(part, found)| decode(part, found)).collect();
+        let is_one = |(part, _): &(usize, &mut Part)| parts.binary_search_by_key(part, |(part, _)| *part).is_ok();
+        let theirs: Vec<_> = self.parts.iter_mut().enumerate().filter(is_one).collect();
+        let decoded: Vec<Result<()>> =
+            theirs.into_par_iter().zip(&mut found).map(|((_, part), found)| decode(part, found)).collect();
         decoded.into_iter().collect::<Result<()>>()?;
         for ((part, _), found) in parts.iter().zip(found) {
             found.into_iter().for_each(|found| self.push(*part, found, window));
@@ -377,7 +375,7 @@ impl FrameSource for Series {
         let mut spool = Spool::default();
         let parts = if count == 0 { 0..0 } else { self.parts_of(&(first..end)) };
         let wanted = |part| (part, self.wanted(part, (first..end).step_by(step)));
-        let all: Vec<_> = parts.clone().map(wanted).collect();
+        let all: Vec<_> = parts.clone().map(wanted).filter(|(_, wanted)| !wanted.is_empty()).collect();
         for some in all.chunks(TOGETHER) {
             self.add(some, &mut window, &mut spool)?;
         }

@@ -9,7 +9,7 @@ use std::path::Path;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::files;
 use wavesplat_core::base::mapped::{Access, FileBytes};
-use wavesplat_core::base::output::Output;
+use wavesplat_core::base::output::{Output, part_of};
 use wavesplat_core::source::scan::scan;
 use wavesplat_core::source::{Archive, FrameSource};
 use wavesplat_format::{CompletePrefix, Error as FormatError, Window};
@@ -66,6 +66,11 @@ pub fn open(path: &Path, replace: bool, if_unfinished: IfUnfinished) -> Result<(
     let held = if_unfinished.choose(if_unfinished.windows(part)?, part)?;
     out.begin_at(held.as_ref().map_or(0, CompletePrefix::bytes))?;
     Ok((out, held))
+}
+
+/// Whether an earlier run left an unfinished file that would become `path`.
+pub fn is_begun(path: &Path) -> bool {
+    part_of(path).exists()
 }
 
 /// Opens the successor of a finished file, which begins with all of its windows. Returns the windows to continue from:

@@ -1,7 +1,8 @@
 //! Frames of a run that goes on: files as they appear, in a folder, by a pattern or in a list; or one file that grows.
 
 use super::inputs::{Expanded, expand, is_empty, is_list, is_pattern};
-use super::{by_name, describe_frame, npy, open_files, stream};
+use super::{by_name, describe_frame, npy, open_files, open_series, stream};
+use crate::zarr::metadata_file;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use wavesplat_core::base::description::{Description, extended};
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::file_header::FileHeader;
-use wavesplat_core::source::follow::{Follow, FollowedReader, NamedPipe, wait_for};
+use wavesplat_core::source::follow::{Follow, FollowedReader, GrowingFile, NamedPipe, wait_for};
 use wavesplat_core::source::series::{FrameFiles, SeriesBuilder, check_grid};
 use wavesplat_core::source::{Archive, Extent, FrameSource, FrameWindow, OpenOptions, times};
 
@@ -31,6 +32,9 @@ pub(super) fn open(inputs: &[PathBuf], options: &OpenOptions, follow: &Follow) -
     let is_there = |_| Ok((only.exists() || is_pattern(only)).then_some(()));
     if wait_for(follow, is_there)?.is_none() {
         return Err(Error::path(only, "was not there when the run ended"));
+    }
+    if metadata_file(only).is_some() {
+        return Err(Error::path(only, "is a Zarr store, which can be read once the run has ended"));
     }
     if !has_files(only) {
         return growing(only, options, follow);
@@ -70,14 +74,17 @@ fn growing(path: &Path, options: &OpenOptions, follow: &Follow) -> Result<Box<dy
     }
     let is_file = path.is_file();
     let reader: Box<dyn Read + Send> = match is_file {
-        true => Box::new(File::open(path).map_err(|e| Error::io(path, "opening", e))?),
+        true => Box::new(GrowingFile(File::open(path).map_err(|e| Error::io(path, "opening", e))?)),
         false => Box::new(NamedPipe::open(path.into())),
     };
     let stream = stream::Stream::open(path, FollowedReader::new(reader, follow.clone()), options)?;
     if !is_file || stream.archive().frames.is_none() {
         return Ok(Box::new(stream));
     }
-    wait_for(follow, |_| Ok(None::<()>))?;
+    wait_for(follow, |is_over| {
+        follow.is_complete(path, is_over); // a change is no silence
+        Ok(None::<()>)
+    })?;
     open_files(&[path.into()], options)
 }
 
@@ -111,6 +118,9 @@ impl Finder {
     fn next(&mut self) -> Result<Vec<Found>> {
         let look = |is_over| self.look(is_over, |new| self.read(new));
         let found = wait_for(&self.follow, look)?.unwrap_or_default();
+        if found.is_empty() {
+            self.follow.end_with(self.files.paths.len());
+        }
         for Found { path, time, .. } in &found {
             self.files.paths.push(path.clone());
             self.files.times.extend(time);
@@ -124,7 +134,10 @@ impl Finder {
             return Ok(None);
         }
         match self.complete_files(is_over).and_then(read) {
-            Err(error) if !is_over && !matches!(error, Error::Changed { .. }) => Ok(None),
+            Err(error) if !is_over && !matches!(error, Error::Changed { .. }) => {
+                self.follow.put_up_with(&error.to_string());
+                Ok(None)
+            }
             found => found,
         }
     }
@@ -140,11 +153,15 @@ impl Finder {
             let what = "files that were read are gone, or new ones come before them in order";
             return Err(Error::changed(&self.input, what));
         }
+        if !all.times.starts_with(&known.times) {
+            return Err(Error::changed(&self.input, "gives other times to frames that were read"));
+        }
         if !known.paths.is_empty() && known.times.is_empty() != all.times.is_empty() {
             return Err(Error::changed(&self.input, "a list of its files has come or gone; give that as the input"));
         }
         let times = all.times.into_iter().map(Some).chain(iter::repeat(None));
-        let new = all.paths.into_iter().zip(times).skip(known.paths.len());
+        let most = self.follow.ended_with().unwrap_or(usize::MAX);
+        let new = all.paths.into_iter().zip(times).take(most).skip(known.paths.len());
         // All are looked at, so that each is known to stay the same from now on.
         let are_complete = new.map(|file| (self.follow.is_complete(&file.0, is_over), file)).collect::<Vec<_>>();
         Ok(are_complete.into_iter().take_while(|(is_complete, _)| *is_complete).map(|(_, file)| file).collect())
@@ -223,11 +240,9 @@ impl Finder {
     /// All frames of the run that has ended, which are those that were found.
     fn whole(&self, found: &SeriesBuilder) -> Result<Box<dyn FrameSource>> {
         found.so_far().check_unchanged()?;
-        let whole = open_files(slice::from_ref(&self.input), &self.options)?;
-        match whole.archive().frames == found.so_far().archive().frames {
-            true => Ok(whole),
-            false => Err(Error::changed(&self.input, "has frames that came after the end of the run")),
-        }
+        let notes = expand(slice::from_ref(&self.input), &self.options).map(|all| all.files.notes);
+        let FrameFiles { paths, times, .. } = self.files.clone();
+        Ok(Box::new(open_series(&FrameFiles { paths, times, notes: notes.unwrap_or_default() }, &self.options)?))
     }
 
     /// Takes the times of new frames, unless the user gives times or the first frames have none.

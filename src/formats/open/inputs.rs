@@ -86,7 +86,7 @@ fn expand_one(input: &Path, options: &OpenOptions) -> Result<FrameFiles> {
         return directory(input, options);
     }
     if !input.exists() && is_pattern(input) {
-        return Ok(FrameFiles { paths: matching(input)?, ..FrameFiles::default() });
+        return Ok(FrameFiles { paths: frames_matching(input, options)?, ..FrameFiles::default() });
     }
     match by_name(input).map(|format| &format.reader) {
         Some(Reader::List(read)) => read(input),
@@ -101,7 +101,7 @@ pub(super) fn is_empty(input: &Path, options: &OpenOptions) -> bool {
         return metadata_file(input).is_none() && !visible_files(input).is_ok_and(holds);
     }
     let is_valid = |text: &str| glob::Pattern::new(text).is_ok();
-    !input.exists() && input.to_str().is_some_and(is_valid) && matching(input).is_err()
+    !input.exists() && input.to_str().is_some_and(is_valid) && frames_matching(input, options).is_err()
 }
 
 /// Whether a file lists others.
@@ -152,6 +152,13 @@ fn refuse_twice(paths: &[PathBuf]) -> Result<()> {
 /// Whether a path that is not there is a pattern.
 pub(super) fn is_pattern(path: &Path) -> bool {
     path.to_string_lossy().contains(['*', '?', '['])
+}
+
+/// The files that match a pattern, but for those that a run needs beside its frames.
+fn frames_matching(pattern: &Path, options: &OpenOptions) -> Result<Vec<PathBuf>> {
+    let mut paths = matching(pattern)?;
+    paths.retain(|path| !is_of_run(path, options));
+    if paths.is_empty() { Err(Error::path(pattern, "no file matches this pattern")) } else { Ok(paths) }
 }
 
 fn matching(pattern: &Path) -> Result<Vec<PathBuf>> {

@@ -23,7 +23,7 @@ use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::file_header::{FileHeader, head};
-use wavesplat_core::source::series::Series;
+use wavesplat_core::source::series::{FrameFiles, Series};
 use wavesplat_core::source::{Extent, FrameSource, OpenOptions, VariableInfo};
 
 /// Opens an archive: frame files in order, one directory, one pattern, one 4-D file, one list of files (`.pvd`,
@@ -70,15 +70,17 @@ pub fn open(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSo
 
 fn open_files(inputs: &[PathBuf], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let inputs::Expanded { files, planes } = inputs::expand(inputs, options)?;
-    let is_alone = files.paths.len() == 1;
-    let open = |options: &OpenOptions| {
-        let read = if is_alone { describe } else { describe_frame };
-        Series::open(&files, options, |path, extent| read(path, options, extent))
-    };
+    let open = |options: &OpenOptions| open_series(&files, options);
     match planes {
         Some(planes) => planes::stacked(&files.paths[0], options, planes, open),
         None => Ok(Box::new(open(options)?)),
     }
+}
+
+/// The frames of some files.
+fn open_series(files: &FrameFiles, options: &OpenOptions) -> Result<Series> {
+    let read = if files.paths.len() == 1 { describe } else { describe_frame };
+    Series::open(files, options, |path, extent| read(path, options, extent))
 }
 
 /// The variables of the first file, if it has several and [`OpenOptions::variable`] must choose one; else none. A

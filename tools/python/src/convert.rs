@@ -11,15 +11,15 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use wavesplat::Result;
 use wavesplat::base::memory::for_reading;
 use wavesplat::base::sample::SampleType;
 use wavesplat::convert::{ConvertRequest, append, run};
 use wavesplat::file::merge::Shards;
-use wavesplat::file::resume::IfUnfinished;
+use wavesplat::file::resume::{IfUnfinished, ends_with, is_begun};
 use wavesplat::file::{CoefficientFile, units};
 use wavesplat::formats::{self, NamedArrays, extension_of_frames};
-use wavesplat::source::{FrameSource, GivenTimes, OpenOptions};
+use wavesplat::source::{Archive, FrameSource, GivenTimes, OpenOptions};
+use wavesplat::{Error, Result};
 
 /// The request for a conversion, and its output.
 #[derive(FromPyObject)]
@@ -70,11 +70,13 @@ pub(crate) struct Appended {
 }
 
 impl Appended {
-    /// Opens frames and adds them. `open` may call Python; the times are put on the clock of the file.
+    /// Opens frames and adds them. `open` may call Python; the times are put on the clock of the file. Frames that can be read
+    /// `again` are compared with the file's last ones.
     fn run(
         &self,
         py: Python<'_>,
         options: &OpenOptions,
+        again: bool,
         open: impl FnOnce(Caller, &OpenOptions) -> Result<Box<dyn FrameSource>> + Send,
         report: Option<&Py<PyAny>>,
     ) -> PyResult<Converted> {
@@ -85,11 +87,30 @@ impl Appended {
             let clock = Some(units(file.metadata()));
             let mut source = open(caller, &OpenOptions { clock, memory: for_reading(self.memory), ..options.clone() })?;
             let mut notes: Vec<String> = source.archive().notes.iter().map(advice::of_note).collect();
+            let is_new = self.overwrite || is_begun(&self.path);
+            if !is_new && again && ends_with(&file, source.as_mut())? {
+                let what = "ends with these frames already; overwrite=True adds them once more";
+                return if self.resume { Ok((None, notes)) } else { Err(Error::input(&self.path, what)) };
+            }
+            self.check_times(&file, source.archive())?;
             let done = append(source.as_mut(), &file, self.memory, if_unfinished, progress);
             let done = done.map_err(|failure| failure.error)?;
             notes.extend(done.warnings.iter().map(advice::of_note));
             Ok((Some(serde_json::to_string(&done).unwrap_or_default()), notes))
         })
+    }
+}
+
+impl Appended {
+    /// An error unless the frames come after those of the file.
+    fn check_times(&self, file: &CoefficientFile, archive: &Archive) -> Result<()> {
+        match (file.metadata().times.last(), archive.times.first()) {
+            (Some(last), Some(first)) if first <= last && !self.overwrite => {
+                let what = format!("has frames up to the time {last}, and the new ones begin at {first}");
+                Err(Error::input(&self.path, what))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -149,7 +170,7 @@ pub(crate) fn append_frames(
     let open = |caller, options: &OpenOptions| {
         formats::open_named_stream(layout.name, FrameReader::new(iterator, caller), options)
     };
-    appended.run(py, &options, open, report.as_ref())
+    appended.run(py, &options, false, open, report.as_ref())
 }
 
 impl Layout {
@@ -221,7 +242,7 @@ pub(crate) fn append_arrays(
         let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
         formats::open_arrays(Path::new(&name), &arrays, options)
     };
-    appended.run(py, &options, open, report.as_ref())
+    appended.run(py, &options, true, open, report.as_ref())
 }
 
 /// Joins shards to one file, and returns a report as JSON.

@@ -78,3 +78,36 @@ def test_frames_that_fail_leave_windows_to_resume_after(tmp_path):
     assert report["frames"] == 40
     assert report["frames_before"] > 8
     assert np.abs(wavesplat.open(path)[:] - data).max() <= 0.01
+
+
+def test_frames_are_not_added_twice(tmp_path):
+    data, times, path = smooth(), np.arange(40.0), tmp_path / "run.wspl"
+    ds = xr.Dataset({"u": (("time", "z", "y", "x"), data)})
+    ds.isel(time=slice(0, 16)).to_wavesplat(path, **SETTINGS)
+    later = ds.isel(time=slice(16, None))
+    wavesplat.append(later, path)
+    with pytest.raises(wavesplat.InputError, match="ends with these frames already"):
+        wavesplat.append(later, path)
+    assert wavesplat.append(later, path, resume=True) == {}
+    assert wavesplat.open(path).shape[0] == 40
+    wavesplat.convert(data[:16], path, times=times[:16], overwrite=True, **SETTINGS)
+    with pytest.raises(wavesplat.InputError, match="up to the time 15, and the new ones begin at 8"):
+        wavesplat.append(data[8:], path, times=times[8:])
+
+
+def test_no_file_is_changed_if_one_is_not_there(tmp_path):
+    ds = xr.Dataset({name: (("time", "z", "y", "x"), smooth()) for name in "uv"})
+    ds[["u"]].isel(time=slice(0, 16)).to_wavesplat(tmp_path / "run_u.wspl", **SETTINGS)
+    with pytest.raises(FileNotFoundError, match="run_v"):
+        wavesplat.append(ds.isel(time=slice(16, None)), tmp_path / "run_%n.wspl")
+    assert wavesplat.open(tmp_path / "run_u.wspl").shape[0] == 16
+
+
+def test_masked_frames_are_masked_as_before(tmp_path):
+    data = np.ma.masked_greater(smooth(), 1.5)
+    for missing in ("mask", -999.0):
+        path = tmp_path / f"run_{missing}.wspl"
+        wavesplat.convert(data[:16], path, missing=missing, **SETTINGS)
+        wavesplat.append(data[16:], path)
+        found = np.ma.masked_invalid(wavesplat.open(path)[:])
+        assert np.array_equal(np.ma.getmaskarray(np.ma.masked_equal(found, -999.0)), data.mask)

@@ -5,6 +5,7 @@ mod options;
 mod several;
 
 use super::results::results_text;
+use crate::messages::note;
 use crate::{CommonArgs, InputArgs, RemoteArgs, advice, coefficient_name, note_text, spare_inputs};
 use clap::{Arg, Args, Command};
 pub(crate) use options::ConvertArgs;
@@ -117,7 +118,7 @@ impl ConvertArgs {
             return Err(Error::usage(format!("--follow: --frames {frames} has an end; a: and a::step go on")));
         }
         self.common.note(format_args!("waits for frames until {end}"));
-        args.input.follow = Some(Follow::new(end.clone()));
+        args.input.follow = Some(Follow::new(end.clone(), |why| note(format_args!("cannot be read yet: {why}"))));
         Ok(args)
     }
 
@@ -139,7 +140,8 @@ impl ConvertArgs {
     /// Reports a conversion, and the errors of results if they were measured.
     fn report(&self, outcome: Outcome, request: &ConvertRequest, files: Files) -> Result<()> {
         let Some(done) = outcome.transpose() else {
-            self.common.note(format_args!("{}: is complete already", self.output.display()));
+            let later = if self.follow.is_some() { "; wavesplat append adds later frames" } else { "" };
+            self.common.note(format_args!("{}: is complete already{later}", self.output.display()));
             return Ok(());
         };
         let text = |r: &ConvertReport| {

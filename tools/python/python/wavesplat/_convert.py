@@ -156,7 +156,8 @@ def append(
         times: The time of each frame, for arrays: needed if the file has times. Dates go on the file's clock.
         time_unit: The unit of ``times``, perhaps since a date.
         resume: Whether to continue an unfinished run of this function.
-        overwrite: Whether to discard what an earlier run left unfinished.
+        overwrite: Whether to discard what an earlier run left unfinished, and to add frames that are not later ones.
+            Without times, arrays are not compared with the frames that the file has.
         memory: Bytes that the conversion may take.
         progress: Whether to show progress, or a function of (done, all).
 
@@ -165,7 +166,7 @@ def append(
 
     Raises:
         ValueError: A setting is wrong, or an earlier run was not finished.
-        InputError: The frames do not fit the file, or only one of both has times.
+        InputError: The frames do not fit the file, it has them already, or only one of both has times.
 
     """
     appending = Appending(located(path), whole("memory", memory), bool(resume), bool(overwrite))
@@ -178,7 +179,7 @@ def append(
         return append_dataset(source, appending, variable=name, axes=letters, progress=progress)
     if variable is not None or axes is not None:
         raise ValueError("variable and axes are for a Dataset: an array is (time, z, y, x)")
-    frames = Frames.of(source, memory, None)
+    frames = Frames.of(source, memory, _missing_of(appending.path))
     layout = _layout(frames, Times.of(times, text("time_unit", time_unit)), None, None)
     with reporting(progress, "append") as report:
         return told(*_wavesplat.append_frames(frames.parts, layout, vars(appending), report))
@@ -215,6 +216,12 @@ def merge(
         names = [located(shard) for shard in shards]
         found: dict[str, Any] = json.loads(_wavesplat.merge(names, located(path), resume, overwrite, report))
     return found
+
+
+def _missing_of(path: str) -> str | float | None:
+    """What a file does with missing samples, as `convert` takes it."""
+    file = _wavesplat.File(path)
+    return file.missing_value if file.missing_value is not None else file.setting("missing")
 
 
 def _layout(frames: Frames, when: Times, spacing: Any, origin: Any) -> dict[str, Any]:

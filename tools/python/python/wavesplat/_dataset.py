@@ -57,6 +57,8 @@ def append_dataset(
     """Adds the frames of a variable to a file, or those of each of several to a file of its own."""
     dataset = _dataset(source)
     names = [variable] if variable is not None else _volumes(dataset)
+    for name in names:
+        _wavesplat.File(appending.path.replace(NAME, name))  # so that none is changed if one is not there
 
     def one(name: str, path: str) -> dict[str, Any]:
         settings = vars(replace(appending, path=path))
