@@ -296,12 +296,15 @@ mod tests {
     #[test]
     fn a_reader_goes_on_until_the_run_has_ended() {
         /// Nothing at first, then bytes one by one with nothing between.
-        struct Slow(u8);
+        struct Slow(u32);
         impl Read for Slow {
             fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
                 self.0 += 1;
                 let is_there = self.0.is_multiple_of(2) && self.0 < 8;
-                out[..usize::from(is_there)].fill(self.0);
+                out[..usize::from(is_there)].fill(self.0 as u8);
+                if !is_there {
+                    sleep(Duration::from_millis(1));
+                }
                 Ok(is_there.into())
             }
         }
