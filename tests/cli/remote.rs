@@ -348,6 +348,12 @@ fn passwords_and_signatures_are_not_shown() {
     let asked = server.asked();
     assert_eq!(asked[0].authorization.as_deref(), Some("Basic bWU6aGlkZGVu"));
     assert_eq!(asked[0].path, "/a/run.wspl?sig=hidden");
+    let both = format!("NO_PROXY=127.0.0.1 $WAVESPLAT info '{address}' '{address}'");
+    let shown = work.shell(&format!("{both} --json")).ok();
+    assert_eq!(shown.json()["files"].as_array().unwrap().len(), 2);
+    assert!(!shown.text().contains("hidden"));
+    let message = work.shell(&format!("{both} --frames 1:2")).fails(2, &["--frames is for frames"]);
+    assert!(!message.message().contains("hidden"), "{}", message.message());
     let refused = Server::with(bytes().clone(), |_| Fate::Refuse(403, String::new(), String::new()));
     let address = address.replace(&server.port().to_string(), &refused.port().to_string());
     let message = work.shell(&format!("NO_PROXY=127.0.0.1 $WAVESPLAT info '{address}'")).fails(1, &["403"]);

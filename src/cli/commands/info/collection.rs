@@ -1,12 +1,13 @@
 //! Describes several coefficient files as one data set: the variables of a run, or its parts.
 
-use crate::{CommonArgs, print};
+use super::InfoArgs;
+use crate::print;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::address::{is_address, public_name};
 use wavesplat_core::base::error::Result;
-use wavesplat_core::base::mapped::Access;
 use wavesplat_engine::file::report::BoundReport;
 use wavesplat_engine::file::{CoefficientFile, time_labels};
 use wavesplat_formats::{extension_of_frames, files};
@@ -59,29 +60,32 @@ pub(super) fn coefficient_files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
             let has_frames = || folder.read_dir().is_ok_and(|mut all| all.any(is_frame));
             Ok(files(folder, "wspl").ok().filter(|_| !has_frames()).unwrap_or_default())
         }
-        [pattern] if !pattern.exists() && is_coefficient_name(pattern) => match files(pattern, "wspl")? {
-            only if only == inputs => Ok(Vec::new()), // no pattern
-            found => Ok(found),
-        },
+        [pattern] if !is_address(pattern) && !pattern.exists() && is_coefficient_name(pattern) => {
+            match files(pattern, "wspl")? {
+                only if only == inputs => Ok(Vec::new()), // no pattern
+                found => Ok(found),
+            }
+        }
         several if several.len() > 1 && several.iter().all(|path| is_coefficient_name(path)) => Ok(several.to_vec()),
         _ => Ok(Vec::new()),
     }
 }
 
-pub(super) fn run(paths: &[PathBuf], access: Access, common: &CommonArgs) -> Result<()> {
-    let members = paths.iter().map(|path| Member::open(path, access)).collect::<Result<_>>()?;
+pub(super) fn run(paths: &[PathBuf], args: &InfoArgs) -> Result<()> {
+    let open = |path: &PathBuf| Ok(Member::new(path, &args.remote.open(path, args.input.access())?));
+    let members = paths.iter().map(open).collect::<Result<_>>()?;
     let all = Collection::new(members);
-    if common.json { common.report(&all, false) } else { print(&all.text()) }
+    if args.common.json { args.common.report(&all, false) } else { print(&all.text()) }
 }
 
 impl Member {
-    fn open(path: &Path, access: Access) -> Result<Self> {
-        let file = CoefficientFile::open_with(path, access)?;
+    fn new(path: &Path, file: &CoefficientFile) -> Self {
+        let path = public_name(path);
         let m = file.metadata();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        Ok(Self {
-            path: path.into(),
+        Self {
             variable: m.variable.clone().unwrap_or_else(|| stem.into()),
+            path,
             sample: m.sample.name(),
             dims: m.dims,
             spacing: m.spacing,
@@ -92,7 +96,7 @@ impl Member {
             bytes: file.bytes(),
             raw_bytes: m.dims.iter().product::<u64>() * m.frames * file.of_source().0.size() as u64,
             promise: BoundReport::from_metadata(m),
-        })
+        }
     }
 }
 

@@ -10,6 +10,7 @@ mod variables;
 use crate::{CommonArgs, InputArgs, RemoteArgs, SelectArgs};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use wavesplat_core::base::address::public_name;
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::values::share;
 use wavesplat_engine::file::CoefficientFile;
@@ -56,8 +57,8 @@ pub(crate) fn run(args: &InfoArgs) -> Result<()> {
     args.common.start()?;
     let several = collection::coefficient_files(&args.inputs)?;
     if let Some(first) = several.first() {
-        args.refuse_for_coefficients(first)?;
-        return collection::run(&several, args.input.access(), &args.common);
+        args.refuse_for_coefficients(&public_name(first))?;
+        return collection::run(&several, args);
     }
     if let Some(file) = args.coefficients()? {
         return coefficients::run(&file, &args.common);
