@@ -56,7 +56,7 @@ impl Job {
         Self::new(work, &format!("convert {input} -o {FILE} {options} {from}"), "--resume", &[FILE])
     }
 
-    /// A conversion of two variables, frames of which are in the same files.
+    /// A conversion of two variables. Each file has a frame of both.
     pub(super) fn convert_two(archive: &Archive, options: &str) -> Self {
         let work = Work::new();
         write_two(&work, archive);

@@ -58,7 +58,7 @@ impl fmt::Display for RunEnd {
 /// A file is complete when its length and its time of change have stayed the same for so long, or the run has ended.
 const SETTLED: Duration = Duration::from_secs(2);
 
-/// What cannot be read for so long is told.
+/// After so long, the user is told what cannot be read.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// How a run is followed. Copies share what they know of it, so that several variables wait once, and end with the same files.
@@ -102,8 +102,8 @@ impl Follow {
         }
     }
 
-    /// Takes note of an error that may pass, and tells it once if it lasts.
-    pub fn put_up_with(&self, error: &str) {
+    /// Notes an error that may pass. If it lasts, the user is told once.
+    pub fn note_error(&self, error: &str) {
         let Ok(mut files) = self.files.lock() else { return };
         match &mut files.unreadable {
             Some((known, since)) if known == error => {
@@ -179,7 +179,7 @@ pub fn wait_for<T, E>(follow: &Follow, mut look: impl FnMut(bool) -> Result<Opti
     }
 }
 
-/// Bytes that a run writes: they end with the run.
+/// Reads the bytes that a run writes, until the run has ended.
 #[derive(Debug)]
 pub struct FollowedReader<R> {
     reader: R,
@@ -240,7 +240,7 @@ impl NamedPipe {
     }
 }
 
-/// Sends what one program writes to a pipe; an error if nobody wants it.
+/// Sends the bytes that one program writes to a pipe. Fails once the reader is gone.
 fn send_all(path: &Path, to: &SyncSender<io::Result<Vec<u8>>>) -> Result<(), SendError<io::Result<Vec<u8>>>> {
     let mut pipe = match File::open(path) {
         Ok(pipe) => pipe,

@@ -1,4 +1,4 @@
-//! The reader stage: reads windows of frames and sends blocks.
+//! Prepares the windows of a source: scans them, chooses how they are coded, and gathers their blocks.
 
 use super::candidates::SchemeSelector;
 use super::coarse::CoarseBlocks;
@@ -10,7 +10,6 @@ use super::{ConvertConfig, MissingPolicy, Plan, WindowJob, WindowsDone};
 use crossbeam_channel::Sender;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use wavesplat_core::base::description::Description;
 use wavesplat_core::base::error::{Error, Note, Remedy, Result};
 use wavesplat_core::base::grid::{Grid, Region};
 use wavesplat_core::base::sample::{self, SampleType, join_ranges};
@@ -36,144 +35,16 @@ pub(super) struct BlockSamples {
     pub(super) samples: Buffer<u8>,
 }
 
-/// Reads windows of all sources in turn until their frames end, and sends those that the files do not have yet. Returns the
-/// time spent reading each source, and what it found.
-pub(super) fn read(mut readers: Vec<SourceReader<'_>>, out: &Sender<NextBlock>) -> Vec<Result<Reading>> {
-    let is_over = |reader: &SourceReader<'_>| reader.ended.is_some();
-    while let Some(next) =
-        readers.iter_mut().filter(|reader| !is_over(reader)).min_by_key(|reader| reader.frames_read())
-    {
-        match next.read_window(out) {
-            Ok(Next::Window) => {}
-            Ok(Next::End) => next.end(Ok(())),
-            Ok(Next::Unwanted) => break,
-            Err(error) => next.end(Err(error)),
-        }
-    }
-    readers.into_iter().map(SourceReader::finish).collect()
-}
-
-/// The result of reading a source.
-pub(super) struct Reading {
-    /// The time that it took.
-    pub(super) busy: Duration,
-    pub(super) findings: Findings,
-    /// The source's description, which is complete when all frames were read.
-    pub(super) description: Option<Description>,
-}
-
-/// What follows a window.
-enum Next {
-    Window,
-    /// The frames ended.
-    End,
-    /// A later stage failed, and reports why.
-    Unwanted,
-}
-
-/// Reads the source of one conversion.
-pub(super) struct SourceReader<'a> {
-    source: &'a mut dyn FrameSource,
-    reader: WindowReader<'a>,
-    done: WindowsDone,
-    /// The number of the next window.
-    index: usize,
-    busy: Duration,
-    ended: Option<Result<()>>,
-}
-
-impl<'a> SourceReader<'a> {
-    pub(super) fn new(
-        conversion: usize,
-        source: &'a mut dyn FrameSource,
-        input: &'a CodedInput,
-        plan: &'a Plan<'a>,
-        done: WindowsDone,
-    ) -> Self {
-        let mut reader = WindowReader { conversion, ..WindowReader::new(input, plan, &done) };
-        done.windows[..done.first_window].iter().for_each(|window| reader.continue_after(window));
-        reader.before = reader.frames;
-        Self { source, reader, index: done.first_window, done, busy: Duration::ZERO, ended: None }
-    }
-
-    /// The blocks of tier 0 of the file; none if the number of frames is not known.
-    pub(super) fn blocks(&self) -> Option<u64> {
-        let WindowReader { archive, config, plan, .. } = &self.reader;
-        let windows = archive.frames?.div_ceil(config.window) + self.done.first_window;
-        Some((windows * plan.blocks_of_window()) as u64)
-    }
-
-    /// The blocks of tier 0 that the file has already.
-    pub(super) fn blocks_done(&self) -> u64 {
-        (self.done.windows.len() * self.reader.plan.blocks_of_window()) as u64
-    }
-
-    fn frames_read(&self) -> usize {
-        self.reader.first()
-    }
-
-    fn end(&mut self, how: Result<()>) {
-        self.ended = Some(how);
-    }
-
-    fn finish(self) -> Result<Reading> {
-        let Self { source, reader, busy, ended, .. } = self;
-        let description = source.archive().description.clone();
-        ended.unwrap_or(Ok(())).map(|()| Reading { busy, findings: reader.findings, description })
-    }
-
-    /// An error unless the frames of a window that the file has have its times. Those of a run that goes on are not known before.
-    fn check_times(&self, Window { first_frame, frames, .. }: &Window) -> Result<()> {
-        let (first, frames) = (*first_frame as usize, *frames as usize);
-        let known = self.done.times.get(first..first + frames).unwrap_or_default();
-        let own = self.source.archive().times_of(self.reader.first()..self.reader.first() + frames);
-        match own.iter().map(|time| time.to_bits()).eq(known.iter().map(|time| time.to_bits())) {
-            true => Ok(()),
-            false => Err(Error::path(&self.done.name, "was begun with other times")),
-        }
-    }
-
-    /// Reads the next window, and sends its blocks unless the file has it.
-    fn read_window(&mut self, out: &Sender<NextBlock>) -> Result<Next> {
-        let (started, full) = (Instant::now(), self.reader.config.window);
-        let known = self.done.windows.get(self.index);
-        let Some(window) = self.reader.next(self.source, known.map_or(full, |known| known.frames as usize))? else {
-            return if known.is_some() { Err(self.reader.ended(&self.done)) } else { Ok(Next::End) };
-        };
-        let index = self.index;
-        self.index += 1;
-        if let Some(known) = known {
-            self.check_times(known)?;
-            self.reader.skip_done(window.as_ref(), known, &self.done)?;
-            self.busy += started.elapsed();
-            return Ok(Next::Window);
-        }
-        let is_short = |window: &Window| (window.frames as usize) < full;
-        if index > self.done.first_window && self.done.windows.get(index - 1).is_some_and(is_short) {
-            return Err(self.reader.has_grown(&self.done));
-        }
-        let first = self.reader.first();
-        let times = self.source.archive().times_of(first..first + window.frames());
-        let job = Arc::new(WindowJob { times, ..self.reader.prepare(window.as_ref(), index)? });
-        self.busy += started.elapsed();
-        match self.reader.send_blocks(window.as_ref(), &job, out, &mut self.busy)? {
-            true if window.frames() < full => Ok(Next::End),
-            true => Ok(Next::Window),
-            false => Ok(Next::Unwanted),
-        }
-    }
-}
-
 /// The samples that a scheme is chosen from are divided by this, if it need not be the best.
 const ROUGH: usize = 4;
 
 pub(super) struct WindowReader<'a> {
     /// Which of the conversions it is of.
-    conversion: usize,
-    config: &'a ConvertConfig,
-    plan: &'a Plan<'a>,
+    pub(super) conversion: usize,
+    pub(super) config: &'a ConvertConfig,
+    pub(super) plan: &'a Plan<'a>,
     /// The archive of the coded samples.
-    archive: &'a Archive,
+    pub(super) archive: &'a Archive,
     /// The pixels of a sampled bound.
     pixels: Vec<Pixel>,
     /// The range of the frames so far.
@@ -182,15 +53,15 @@ pub(super) struct WindowReader<'a> {
     /// The features of the file.
     features: Features,
     /// The result of scanning the samples.
-    findings: Findings,
+    pub(super) findings: Findings,
     /// The scheme of the window before.
     scheme: Option<Scheme>,
     /// Whether schemes are chosen with less care, for an estimate.
     is_rough: bool,
     /// The number of frames in the file so far.
-    frames: u64,
+    pub(super) frames: u64,
     /// Frames of the file that precede the source's first frame.
-    before: u64,
+    pub(super) before: u64,
 }
 
 impl<'a> WindowReader<'a> {
@@ -233,7 +104,7 @@ impl<'a> WindowReader<'a> {
     }
 
     /// The next frames of the source, at most `count`; none at its end.
-    fn next(&self, source: &mut dyn FrameSource, count: usize) -> Result<Option<Box<dyn FrameWindow>>> {
+    pub(super) fn next(&self, source: &mut dyn FrameSource, count: usize) -> Result<Option<Box<dyn FrameWindow>>> {
         let first = self.first();
         let count = self.archive.frames.map_or(count, |all| count.min(all.saturating_sub(first)));
         if count == 0 {
@@ -243,33 +114,33 @@ impl<'a> WindowReader<'a> {
     }
 
     /// The error if a source continues after a short last window that was already converted.
-    fn has_grown(&self, done: &WindowsDone) -> Error {
+    pub(super) fn has_grown(&self, done: &WindowsDone) -> Error {
         let frames = self.frames;
         let what = format!("the input ended after {frames} frames and has grown");
         Error::changed(&done.name, Note::with(what, Remedy::AppendOrBeginAnew { frames }))
     }
 
     /// The error if a source has fewer frames than before.
-    fn ended(&self, done: &WindowsDone) -> Error {
+    pub(super) fn ended(&self, done: &WindowsDone) -> Error {
         let had: u64 = done.windows.iter().map(|window| u64::from(window.frames)).sum();
         let what = format!("the input ends after {} frames; {} were converted before", self.frames, had);
         Error::changed(&done.name, what)
     }
 
     /// The number of the source's next frame.
-    fn first(&self) -> usize {
+    pub(super) fn first(&self) -> usize {
         (self.frames - self.before) as usize
     }
 
     /// Takes over a window's record as if the window had just been coded.
-    fn continue_after(&mut self, window: &Window) {
+    pub(super) fn continue_after(&mut self, window: &Window) {
         self.range = Some(window.range).filter(|range| range.0 <= range.1 && self.config.range.is_none());
         self.scheme = Some(Scheme::from_window(window));
         self.frames += u64::from(window.frames);
     }
 
     /// Continues after a window that the file has; an error if its frames differ from the source's.
-    fn skip_done(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
+    pub(super) fn skip_done(&mut self, window: &dyn FrameWindow, known: &Window, done: &WindowsDone) -> Result<()> {
         let scan = self.scan(window)?;
         window.check_unchanged()?;
         if scan.digest != known.digest || window.frames() != known.frames as usize {
@@ -299,7 +170,7 @@ impl<'a> WindowReader<'a> {
     }
 
     /// Scans a window and prepares its coding.
-    fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
+    pub(super) fn prepare(&mut self, window: &dyn FrameWindow, index: usize) -> Result<WindowJob> {
         let scan = self.scan(window)?;
         self.refuse_missing(window, self.first(), &scan)?;
         self.look_for_fill(window, &scan)?;
@@ -420,7 +291,7 @@ impl<'a> WindowReader<'a> {
     }
 
     /// Reads and sends the window's blocks. False if the receiver is gone.
-    fn send_blocks(
+    pub(super) fn send_blocks(
         &mut self,
         window: &dyn FrameWindow,
         job: &Arc<WindowJob>,

@@ -28,6 +28,7 @@ mod max_error;
 mod pipeline;
 mod plan;
 mod pool;
+mod reading;
 mod record;
 mod request;
 mod results;

@@ -1,8 +1,8 @@
 //! The stages of conversions that go on side by side. One conversion is the usual case.
 
 use super::coded_input::CodedInput;
-use super::gather::{SourceReader, read};
 use super::plan::Plan;
+use super::reading::{SourceReader, read};
 use super::record::WindowWriter;
 use super::target::{ResumePoint, Target, WindowsDone};
 use super::workers::CodedBlock;

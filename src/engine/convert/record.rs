@@ -2,7 +2,7 @@
 
 use super::coded_blocks::CodedBlocks;
 use super::coded_input::CodedInput;
-use super::gather::Reading;
+use super::reading::Reading;
 use super::warnings;
 use super::workers::CodedBlock;
 use super::{ConvertConfig, ConvertReport, Plan, ResumePoint, Target, WindowJob};

@@ -135,7 +135,7 @@ impl Finder {
         }
         match self.complete_files(is_over).and_then(read) {
             Err(error) if !is_over && !matches!(error, Error::Changed { .. }) => {
-                self.follow.put_up_with(&error.to_string());
+                self.follow.note_error(&error.to_string());
                 Ok(None)
             }
             found => found,

@@ -198,6 +198,17 @@ pub(crate) struct Chosen {
     axes: Option<String>,
 }
 
+/// The arrays that Python describes, once there is a caller of Python.
+fn held(
+    arrays: &[GivenArray<'_>],
+    attributes: &[(String, GivenValues<'_>)],
+    read: Py<PyAny>,
+) -> PyResult<impl FnOnce(Caller) -> Arc<dyn NamedArrays> + Send + use<>> {
+    let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<Vec<_>>>()?;
+    let attributes = given_attributes(attributes)?;
+    Ok(|caller| -> Arc<dyn NamedArrays> { Arc::new(PythonArrays::new(arrays, attributes, read, caller)) })
+}
+
 /// Converts a variable of named arrays.
 #[pyfunction]
 #[pyo3(signature = (arrays, attributes, read, chosen, conversion, report = None))]
@@ -210,15 +221,11 @@ pub(crate) fn convert_arrays(
     conversion: Conversion,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
-    let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<Vec<_>>>()?;
-    let attributes = given_attributes(&attributes)?;
+    let arrays = held(&arrays, &attributes, read)?;
     let Chosen { source: name, variable, axes } = chosen;
     let request = conversion.request()?;
     let options = OpenOptions { variable, axes, memory: for_reading(request.memory), ..OpenOptions::default() };
-    let open = |caller| {
-        let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
-        formats::open_arrays(Path::new(&name), &arrays, &options)
-    };
+    let open = |caller| formats::open_arrays(Path::new(&name), &arrays(caller), &options);
     conversion.run(py, &request, open, report.as_ref())
 }
 
@@ -234,14 +241,10 @@ pub(crate) fn append_arrays(
     appended: Appended,
     report: Option<Py<PyAny>>,
 ) -> PyResult<Converted> {
-    let arrays = arrays.iter().map(GivenArray::array).collect::<PyResult<Vec<_>>>()?;
-    let attributes = given_attributes(&attributes)?;
+    let arrays = held(&arrays, &attributes, read)?;
     let Chosen { source: name, variable, axes } = chosen;
     let options = OpenOptions { variable, axes, ..OpenOptions::default() };
-    let open = |caller, options: &OpenOptions| {
-        let arrays: Arc<dyn NamedArrays> = Arc::new(PythonArrays::new(arrays, attributes, read, caller));
-        formats::open_arrays(Path::new(&name), &arrays, options)
-    };
+    let open = |caller, options: &OpenOptions| formats::open_arrays(Path::new(&name), &arrays(caller), options);
     appended.run(py, &options, true, open, report.as_ref())
 }
 

@@ -35,7 +35,7 @@ def convert_dataset(
 ) -> dict[str, Any]:
     """Converts a variable, or each of several to a file of its own."""
     dataset = _dataset(source)
-    names = [variable] if variable is not None else _volumes(dataset)
+    names = _names(dataset, variable)
     for name in names:
         conversion.allowed.of_variable(name)  # so that none is written if one lacks an entry
 
@@ -56,7 +56,7 @@ def append_dataset(
 ) -> dict[str, Any]:
     """Adds the frames of a variable to a file, or those of each of several to a file of its own."""
     dataset = _dataset(source)
-    names = [variable] if variable is not None else _volumes(dataset)
+    names = _names(dataset, variable)
     for name in names:
         _wavesplat.File(appending.path.replace(NAME, name))  # so that none is changed if one is not there
 
@@ -86,6 +86,11 @@ def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
     if not isinstance(source, xr.Dataset):
         raise ValueError(f"source: takes a DataArray or a Dataset, not {type(source).__name__}")
     return source
+
+
+def _names(dataset: xr.Dataset, variable: str | None) -> list[str]:
+    """The variable that is meant, or all that can be frames."""
+    return [variable] if variable is not None else _volumes(dataset)
 
 
 def _volumes(dataset: xr.Dataset) -> list[str]:
