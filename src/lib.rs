@@ -178,7 +178,7 @@ pub mod base {
     #[doc(inline)]
     pub use wavesplat_core::base::{
         address, cancel, choice, description, error, grid, inputs, mapped, memory, position, progress, sample, values,
-        workers,
+        workers, zeroed,
     };
 }
 
@@ -187,7 +187,8 @@ pub mod source {
     #[doc(inline)]
     pub use wavesplat_core::source::{
         Archive, ArraySource, CHANNELS, ColourTransform, FrameSource, FrameWindow, GivenTimes, OpenOptions,
-        RegularTimes, Selection, Units, VariableAxis, VariableInfo, read_frames, select, value_range, with_times,
+        RegularTimes, Selection, Units, VariableAxis, VariableInfo, copy_box, read_frames, select, value_range,
+        with_times,
     };
 }
 

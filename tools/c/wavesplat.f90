@@ -11,7 +11,9 @@ module wavesplat
     type, bind(c) :: wavesplat_frames
         integer(c_size_t) :: dims(3)
         integer(c_int32_t) :: sample
-        real(c_double) :: spacing(3) = 0, origin(3) = 0, first_time = 0, time_step = 0
+        real(c_double) :: spacing(3) = 0, origin(3) = 0
+        type(c_ptr) :: coordinates(3) = c_null_ptr
+        real(c_double) :: first_time = 0, time_step = 0
         type(c_ptr) :: time_unit = c_null_ptr, variable = c_null_ptr, unit = c_null_ptr
     end type
 
@@ -27,6 +29,12 @@ module wavesplat
         integer(c_int32_t) function push(writer, samples, strides) bind(c, name="wavesplat_push")
             import
             type(c_ptr), value :: writer, samples, strides
+        end function
+
+        integer(c_int32_t) function push_at(writer, time, samples, strides) bind(c, name="wavesplat_push_at")
+            import
+            type(c_ptr), value :: writer, samples, strides
+            real(c_double), value :: time
         end function
 
         integer(c_int32_t) function frame(writer, dims, sample) bind(c, name="wavesplat_frame")
@@ -56,7 +64,7 @@ module wavesplat
         end function
     end interface
 
-    ! Adds a frame: a whole array, or a part of one such as field(1:n, 1:n, 1:n).
+    ! Adds a frame: a whole array, or a part of one such as field(1:n, 1:n, 1:n); with its time where steps differ.
     interface wavesplat_push
         procedure push_f32, push_f64
     end interface
@@ -74,26 +82,35 @@ contains
         status = create(trim(path) // c_null_char, frames, settings // c_null_char, replaces, writer)
     end function
 
-    integer(c_int32_t) function push_f32(writer, field) result(status)
+    integer(c_int32_t) function push_f32(writer, field, time) result(status)
         type(c_ptr), intent(in) :: writer
         real(c_float), intent(in), target :: field(:, :, :)
-        integer(c_size_t), target :: strides(3)
+        real(c_double), intent(in), optional :: time
         call check_frame(writer, shape(field, c_size_t), wavesplat_f32)
-        strides = [step(c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1))), &
-                   step(c_loc(field(1, 1, 1)), c_loc(field(1, min(2, size(field, 2)), 1))), &
-                   step(c_loc(field(1, 1, 1)), c_loc(field(1, 1, min(2, size(field, 3)))))]
-        status = push(writer, c_loc(field(1, 1, 1)), c_loc(strides))
+        status = pushed(writer, c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1)), &
+                        c_loc(field(1, min(2, size(field, 2)), 1)), c_loc(field(1, 1, min(2, size(field, 3)))), time)
     end function
 
-    integer(c_int32_t) function push_f64(writer, field) result(status)
+    integer(c_int32_t) function push_f64(writer, field, time) result(status)
         type(c_ptr), intent(in) :: writer
         real(c_double), intent(in), target :: field(:, :, :)
-        integer(c_size_t), target :: strides(3)
+        real(c_double), intent(in), optional :: time
         call check_frame(writer, shape(field, c_size_t), wavesplat_f64)
-        strides = [step(c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1))), &
-                   step(c_loc(field(1, 1, 1)), c_loc(field(1, min(2, size(field, 2)), 1))), &
-                   step(c_loc(field(1, 1, 1)), c_loc(field(1, 1, min(2, size(field, 3)))))]
-        status = push(writer, c_loc(field(1, 1, 1)), c_loc(strides))
+        status = pushed(writer, c_loc(field(1, 1, 1)), c_loc(field(min(2, size(field, 1)), 1, 1)), &
+                        c_loc(field(1, min(2, size(field, 2)), 1)), c_loc(field(1, 1, min(2, size(field, 3)))), time)
+    end function
+
+    ! Pushes the frame whose first sample, and the next ones along x, y and z, are there.
+    integer(c_int32_t) function pushed(writer, first, x, y, z, time) result(status)
+        type(c_ptr), intent(in) :: writer, first, x, y, z
+        real(c_double), intent(in), optional :: time
+        integer(c_size_t), target :: strides(3)
+        strides = [step(first, x), step(first, y), step(first, z)]
+        if (present(time)) then
+            status = push_at(writer, time, first, c_loc(strides))
+        else
+            status = push(writer, first, c_loc(strides))
+        end if
     end function
 
     ! Stops unless a field is what the frames of a writer are.

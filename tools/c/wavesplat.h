@@ -69,7 +69,7 @@ typedef struct WavesplatFile WavesplatFile;
 // A file that is being written.
 typedef struct WavesplatWriter WavesplatWriter;
 
-// The frames of a run: regular in space and time. Set all fields that are not needed to 0. A plane has 1 voxel along z.
+// The frames of a run. Set all fields that are not needed to 0. A plane has 1 voxel along z.
 typedef struct WavesplatFrames {
   // Voxels along x, y and z.
   size_t dims[3];
@@ -79,9 +79,11 @@ typedef struct WavesplatFrames {
   double spacing[3];
   // The place of the first voxel.
   double origin[3];
+  // The places of all voxels along x, y and z where their distances differ: ascending, as many as there are voxels; or null.
+  const double *coordinates[3];
   // The time of the first frame.
   double first_time;
-  // The time from each frame to the next; 0 if frames have no times.
+  // The time from each frame to the next; 0 if frames have no times, or each is pushed with its own.
   double time_step;
   // The unit of times, such as "s" or "hours since 2000-01-01"; or null.
   const char *time_unit;
@@ -146,13 +148,28 @@ int32_t wavesplat_create(const char *path,
 // Adds a frame: copies it, and returns as soon as the conversion can take it.
 //
 // `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. Frames are
-// converted later, a window (usually 32) at a time: an error may be about an earlier frame. After an error the file cannot be
+// converted later, a window (usually 32) at a time: an error may be about an earlier frame. After such an error the file cannot be
 // finished; call `wavesplat_finish` or `wavesplat_abandon` to free the writer.
 //
 // `samples` points to the first sample of the frame, and every address that the strides reach can be read.
 int32_t wavesplat_push(struct WavesplatWriter *writer,
                        const void *samples,
                        const ptrdiff_t *strides);
+
+// As `wavesplat_push`, for a frame with a time of its own, after that of the frame before. Either all frames have one, or none.
+//
+// As of `wavesplat_push`.
+int32_t wavesplat_push_at(struct WavesplatWriter *writer,
+                          double time,
+                          const void *samples,
+                          const ptrdiff_t *strides);
+
+// Gives memory of the library for the next frame, aligned for any sample. It is pushed without a copy: write all samples, x fastest,
+// and push `samples` with null for `strides`. Do not use it after that.
+//
+// `samples` receives the memory, or null after an error.
+int32_t wavesplat_room(struct WavesplatWriter *writer,
+                       void **samples);
 
 // The voxels along x, y and z of the frames that a writer takes, and the type of their samples.
 //
@@ -184,6 +201,11 @@ int32_t wavesplat_info(const struct WavesplatFile *file, struct WavesplatInfo *i
 //
 // `file` is open. `times` has room for `count` numbers.
 int32_t wavesplat_times(const struct WavesplatFile *file, size_t first, size_t count, double *times);
+
+// Gives the places of the voxels along x, y or z, that is axis 0, 1 or 2, at the level of detail.
+//
+// `file` is open. `coordinates` has room for as many numbers as there are voxels along the axis.
+int32_t wavesplat_coordinates(const struct WavesplatFile *file, size_t axis, double *coordinates);
 
 // Gives the samples of `count` frames from `first` on, of the voxels from `start` up to but without `end` along x, y and z, or of
 // all with null: frame after frame, x fastest, little-endian. `channel` is 0, or one of the three of colours.

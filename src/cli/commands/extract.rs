@@ -11,9 +11,7 @@ use wavesplat_core::base::output::STANDARD;
 use wavesplat_core::source::CHANNELS;
 use wavesplat_engine::file::CoefficientFile;
 use wavesplat_jobs::axes::Axes;
-use wavesplat_jobs::extract::{
-    ExtractConfig, ExtractReport, Files, SampleFormat, SampleOrder, Sink, check_memory, contents, extract_to_sink,
-};
+use wavesplat_jobs::extract::{self, ExtractConfig, ExtractReport, OutputOfExtraction, SampleFormat, SampleOrder};
 
 /// Decode a coefficient file back to samples
 #[derive(Debug, Args)]
@@ -92,24 +90,18 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     if args.skip_damaged {
         file = file.skip_damaged()?;
     }
-    let mut config = ExtractConfig {
+    let config = ExtractConfig {
         frames: args.frames.as_ref().map_or(Ok((0..file.frames()).collect()), |f| f.resolve(file.frames()))?,
         region: args.region(&file)?,
         channel: args.channel(&file)?,
         order: SampleOrder::default(),
         memory: args.common.memory.0,
     };
-    let contents = contents(&file, &config)?;
-    config.order = format.order(&contents);
-    check_memory(&file, &config)?;
-    let files = Files::new(&args.output, format, &config.frames)?;
-    files.paths().try_for_each(|path| spare_inputs(std::slice::from_ref(&args.file), path))?;
-    let paths: Vec<PathBuf> = files.paths().map(Path::to_path_buf).collect();
-    let mut sink = Sink::create(files, &contents, args.force)?;
-    format.notes(&contents).iter().for_each(|note| args.common.note(note));
-    let progress = args.common.progress("extract", "frames");
-    let report = extract_to_sink(&file, &config, &mut sink, &progress)?;
-    sink.finish()?;
+    let output = OutputOfExtraction::new(&file, config, &args.output, format)?;
+    let paths = output.paths();
+    paths.iter().try_for_each(|path| spare_inputs(std::slice::from_ref(&args.file), path))?;
+    output.notes().iter().for_each(|note| args.common.note(note));
+    let report = output.write(args.force, &args.common.progress("extract", "frames"))?;
     args.common.detail_read(report.file_bytes_read, report.file_bytes);
     args.common.report(&Extracted { report, files: paths }, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()
@@ -156,11 +148,8 @@ fn parse_format(text: &str) -> std::result::Result<SampleFormat, String> {
 }
 
 fn format_of(path: &Path) -> Result<SampleFormat> {
-    let formats = || SampleFormat::all().into_iter().map(|format| format!(".{}", format.name())).collect::<Vec<_>>();
-    let what = || {
-        let (name, formats) = (path.display(), formats().join(" "));
-        format!("{name}: the extension is none of {formats}; rename the file or give --format")
-    };
-    let found = if path == Path::new(STANDARD) { SampleFormat::named("npy") } else { SampleFormat::of_ending(path) };
-    found.ok_or_else(|| Error::usage(what()))
+    if path == Path::new(STANDARD) {
+        return SampleFormat::named("npy").ok_or_else(|| Error::usage("--format: name one"));
+    }
+    extract::format_of(path).map_err(|e| Error::usage(format!("{e} or give --format")))
 }

@@ -29,16 +29,31 @@ impl<T: Pod> Zeroed<T> {
     }
 
     fn in_pages(len: usize, are_huge: bool) -> Self {
-        let bytes = len * size_of::<T>();
-        let map = if bytes >= LARGE { MmapMut::map_anon(bytes).ok() } else { None };
-        let Some(map) = map else { return Self::Heap(vec![T::zeroed(); len]) };
-        advise(&map, are_huge);
-        Self::Map(map, len)
+        Self::mapped(len, are_huge).unwrap_or_else(|| Self::Heap(vec![T::zeroed(); len]))
     }
 
-    /// Sets every byte of all numbers.
-    pub fn fill_bytes(&mut self, byte: u8) {
-        bytemuck::cast_slice_mut::<T, u8>(self).fill(byte);
+    /// As [`Self::in_small_pages`]; none if the system has no memory for a large buffer.
+    pub fn try_in_small_pages(len: usize) -> Option<Self> {
+        let is_large = len.checked_mul(size_of::<T>())? >= LARGE;
+        if is_large { Self::mapped(len, false) } else { Some(Self::in_small_pages(len)) }
+    }
+
+    /// A large buffer; none if it is small, or if the system has no memory for it.
+    fn mapped(len: usize, are_huge: bool) -> Option<Self> {
+        let bytes = Some(len * size_of::<T>()).filter(|bytes| *bytes >= LARGE)?;
+        let map = MmapMut::map_anon(bytes).ok()?;
+        advise(&map, are_huge);
+        Some(Self::Map(map, len))
+    }
+
+    /// The bytes of all numbers.
+    pub fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(self)
+    }
+
+    /// As [`Self::bytes`], to write them.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(self)
     }
 }
 
@@ -97,5 +112,12 @@ mod tests {
             buffer.iter_mut().zip(numbers()).for_each(|(to, n)| *to = n);
             assert!(buffer.iter().copied().eq(numbers()));
         }
+        assert!(
+            Zeroed::<u64>::try_in_small_pages(LARGE).is_some_and(|mut buffer| buffer.bytes_mut().len() == 8 * LARGE)
+        );
+        assert!(
+            Zeroed::<u64>::try_in_small_pages(usize::MAX / 16).is_none()
+                && Zeroed::<u64>::try_in_small_pages(usize::MAX).is_none()
+        );
     }
 }

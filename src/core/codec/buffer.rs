@@ -45,7 +45,7 @@ impl<T: Pooled> Buffer<T> {
 
     fn new(mut values: Zeroed<T>, len: usize, is_single: bool) -> Self {
         if cfg!(debug_assertions) {
-            values.fill_bytes(0xFF); // tests then fail if they use a value that was not written: NaN or -1
+            values.bytes_mut().fill(0xFF); // tests then fail if they use a value that was not written: NaN or -1
         }
         Self { values, len, is_single }
     }

@@ -1,6 +1,6 @@
 //! Frames in memory.
 
-use super::{Archive, FrameSource, FrameWindow};
+use super::{Archive, FrameSource, FrameWindow, copy_box};
 use crate::base::error::{Error, Result};
 use crate::base::grid::{Grid, Region};
 use crate::base::sample::SampleType;
@@ -85,13 +85,8 @@ impl FrameWindow for ArrayWindow {
 
     fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
         let Archive { grid, sample, .. } = &self.source.archive;
-        let (whole, size) = (grid.whole(), sample.size());
-        let frame = &self.source.samples[(self.first + frame) * whole.voxels() * size..];
-        let row = (region.dims()[0] * size).max(1);
-        for ((y, z), out) in region.rows().zip(out.chunks_exact_mut(row)) {
-            let start = whole.index([region.start[0], y, z]) * size;
-            out.copy_from_slice(&frame[start..start + row]);
-        }
+        let frame = &self.source.samples[(self.first + frame) * grid.whole().voxels() * sample.size()..];
+        copy_box(frame, grid, sample.size(), region, out);
         Ok(())
     }
 

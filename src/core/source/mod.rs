@@ -292,6 +292,15 @@ pub fn read_frames_into(
     Ok(())
 }
 
+/// Copies a region of a frame on `grid`, whose samples of `size` bytes are in memory, x fastest: what [`FrameWindow::read_box`] does.
+pub fn copy_box(frame: &[u8], grid: &Grid, size: usize, region: &Region, out: &mut [u8]) {
+    let (whole, row) = (grid.whole(), (region.dims()[0] * size).max(1));
+    for ((y, z), out) in region.rows().zip(out.chunks_exact_mut(row)) {
+        let start = whole.index([region.start[0], y, z]) * size;
+        out.copy_from_slice(&frame[start..start + row]);
+    }
+}
+
 /// Some consecutive frames, readable from several threads.
 pub trait FrameWindow: Send + Sync {
     /// Number of frames.

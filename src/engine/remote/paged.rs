@@ -173,6 +173,9 @@ impl<S: Storage> Paged<S> {
 
     /// Reads pages, and keeps them.
     fn read(&self, missing: &[u64], found: &mut BTreeMap<u64, Page>) -> io::Result<()> {
+        if missing.is_empty() {
+            return Ok(());
+        }
         let runs = runs(missing, self.storage.len());
         let read = self.storage.read_many(&runs)?;
         check_lengths(&runs, &read)?;

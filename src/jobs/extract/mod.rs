@@ -7,11 +7,13 @@ mod read;
 mod sink;
 mod strides;
 mod placed;
+mod to_files;
 
 pub use contents::contents;
 pub use placed::extract_to_sink;
 pub use read::read_region;
 pub use sink::{Files, Sink};
+pub use to_files::{OutputOfExtraction, format_of};
 pub use wavesplat_formats::{Contents, Direction, OutputAxis, SampleFormat, SampleOrder};
 
 use ahead::fetch_ahead;

@@ -1,4 +1,5 @@
-// The same from C++: a writer that ends with its scope, and errors as exceptions.
+// The same from C++: a writer that ends with its scope, and errors as exceptions. The solver has doubles and writes floats, right
+// into memory of the library.
 #include "wavesplat.h"
 #include <algorithm>
 #include <cmath>
@@ -21,7 +22,13 @@ public:
     ~Writer() {
         if (writer) wavesplat_abandon(writer); // an exception: what is finished stays in run.wspl.part
     }
-    void push(const std::vector<float> &frame) { check(wavesplat_push(writer, frame.data(), nullptr)); }
+    /// Pushes samples as floats.
+    void push(const std::vector<double> &samples) {
+        void *room;
+        check(wavesplat_room(writer, &room));
+        std::copy(samples.begin(), samples.end(), static_cast<float *>(room));
+        check(wavesplat_push(writer, room, nullptr));
+    }
     void finish() {
         WavesplatWriter *last = writer;
         writer = nullptr;
@@ -34,8 +41,8 @@ private:
 
 int main() {
     const std::size_t n = 40, steps = 64;
-    std::vector<float> field(n * n * n), next;
-    for (std::size_t c = 0; c < field.size(); c++) field[c] = float(std::sin(0.3 * (c % n)) + std::cos(0.2 * (c / (n * n))));
+    std::vector<double> field(n * n * n), next;
+    for (std::size_t c = 0; c < field.size(); c++) field[c] = std::sin(0.3 * (c % n)) + std::cos(0.2 * (c / (n * n)));
 
     WavesplatFrames frames = {};
     frames.dims[0] = frames.dims[1] = frames.dims[2] = n;
@@ -46,7 +53,7 @@ int main() {
         if (s == steps - 1) break;
         next = field;
         for (std::size_t c = n * n; c + n * n < field.size(); c++)
-            next[c] += 0.1f * (field[c - 1] + field[c + 1] + field[c - n] + field[c + n] + field[c - n * n] + field[c + n * n] - 6 * field[c]);
+            next[c] += 0.1 * (field[c - 1] + field[c + 1] + field[c - n] + field[c + n] + field[c - n * n] + field[c + n * n] - 6 * field[c]);
         field.swap(next);
     }
     writer.finish();
@@ -59,7 +66,7 @@ int main() {
     std::vector<float> last(field.size());
     check(wavesplat_read(file.get(), info.frames - 1, 1, nullptr, nullptr, 0, last.data(), last.size() * sizeof(float)));
     double worst = 0;
-    for (std::size_t c = 0; c < last.size(); c++) worst = std::max(worst, double(std::abs(last[c] - field[c])));
+    for (std::size_t c = 0; c < last.size(); c++) worst = std::max(worst, double(std::abs(last[c] - float(field[c]))));
     std::printf("%zu frames, largest error of the last one %.5f, promised %.5f\n", info.frames, worst, info.reached);
     return worst <= info.reached ? 0 : 1;
 }

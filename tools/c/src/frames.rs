@@ -3,6 +3,9 @@
 
 use crate::text;
 use std::ffi::c_char;
+use wavesplat::base::description::{
+    ArrayAxis, AxisRole, Description, Dimension, Values, Variable, is_regular, with_frames,
+};
 use wavesplat::base::sample::SampleType;
 use wavesplat::source::{Archive, RegularTimes};
 use wavesplat::{Error, Grid, Result};
@@ -26,7 +29,7 @@ pub const WAVESPLAT_F32: u32 = 7;
 /// Floats of 64 bits.
 pub const WAVESPLAT_F64: u32 = 8;
 
-/// The frames of a run: regular in space and time. Set all fields that are not needed to 0. A plane has 1 voxel along z.
+/// The frames of a run. Set all fields that are not needed to 0. A plane has 1 voxel along z.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct WavesplatFrames {
@@ -38,9 +41,11 @@ pub struct WavesplatFrames {
     pub spacing: [f64; 3],
     /// The place of the first voxel.
     pub origin: [f64; 3],
+    /// The places of all voxels along x, y and z where their distances differ: ascending, as many as there are voxels; or null.
+    pub coordinates: [*const f64; 3],
     /// The time of the first frame.
     pub first_time: f64,
-    /// The time from each frame to the next; 0 if frames have no times.
+    /// The time from each frame to the next; 0 if frames have no times, or each is pushed with its own.
     pub time_step: f64,
     /// The unit of times, such as "s" or "hours since 2000-01-01"; or null.
     pub time_unit: *const c_char,
@@ -53,71 +58,109 @@ pub struct WavesplatFrames {
 /// The same, checked.
 #[derive(Debug, Clone)]
 pub(crate) struct Frames {
-    pub(crate) dims: [usize; 3],
+    pub(crate) grid: Grid,
     pub(crate) sample: SampleType,
-    pub(crate) spacing: [f64; 3],
-    pub(crate) origin: [f64; 3],
     pub(crate) times: Option<RegularTimes>,
     pub(crate) time_unit: Option<String>,
     pub(crate) variable: Option<String>,
     pub(crate) unit: Option<String>,
+    /// The places of voxels where their distances differ.
+    coordinates: Option<Description>,
 }
 
 impl Frames {
     /// # Safety
-    /// The texts of `given` are null or end with a 0.
+    /// The texts of `given` are null or end with a 0, and coordinates are null or of all voxels along their axis.
     pub(crate) unsafe fn new(given: &WavesplatFrames) -> Result<Self> {
         let sample = SampleType::ALL.get(given.sample as usize).copied();
         let sample = sample.ok_or_else(|| Error::value("sample", given.sample, "is no type of samples"))?;
+        let bytes = given.dims.into_iter().try_fold(sample.size(), usize::checked_mul);
+        if !bytes.is_some_and(|bytes| (1..=MOST_BYTES).contains(&bytes)) {
+            return Err(Error::setting("dims", format!("{:?} voxels are none, or too many", given.dims)));
+        }
         // SAFETY: the caller's.
         let text = |name, text| unsafe { text::optional(name, text) }.map(|text| text.map(String::from));
         let is_timed = given.time_step != 0.0;
         let times = is_timed.then(|| RegularTimes::new(given.first_time, given.time_step)).transpose()?;
-        let frames = Self {
-            dims: given.dims,
+        // SAFETY: the caller's.
+        let listed = [0, 1, 2].map(|axis| unsafe { text::listed(given.coordinates[axis], given.dims[axis]) });
+        let (grid, coordinates) = placed(given, listed)?;
+        Ok(Self {
+            grid,
             sample,
-            spacing: given.spacing.map(|step| if step == 0.0 { 1.0 } else { step }),
-            origin: given.origin,
             times,
             time_unit: text("time_unit", given.time_unit)?,
             variable: text("variable", given.variable)?,
             unit: text("unit", given.unit)?,
-        };
-        frames.check().map(|()| frames)
+            coordinates,
+        })
     }
 
-    /// Their description.
+    /// Their description, before the first of them is there.
     pub(crate) fn archive(&self) -> Archive {
-        let grid = Grid { dims: self.dims, spacing: self.spacing, origin: self.origin };
-        let mut archive = Archive { regular_times: self.times, ..Archive::new(grid, self.sample, None) };
+        let mut archive = Archive { regular_times: self.times, ..Archive::new(self.grid, self.sample, None) };
         (archive.variable, archive.units.samples) = (self.variable.clone(), self.unit.clone());
-        archive.units.times = self.times.and(self.time_unit.clone());
+        (archive.units.times, archive.description) = (self.time_unit.clone(), self.described(0));
         archive
+    }
+
+    /// What is known of the first `frames` frames beside samples, times and a regular grid.
+    pub(crate) fn described(&self, frames: usize) -> Option<Description> {
+        self.coordinates.clone().map(|coordinates| with_frames(coordinates, frames))
     }
 
     /// Bytes of a frame.
     pub(crate) fn bytes(&self) -> usize {
-        self.dims.into_iter().product::<usize>() * self.sample.size()
-    }
-
-    fn check(&self) -> Result<()> {
-        let bytes = self.dims.into_iter().try_fold(self.sample.size(), usize::checked_mul);
-        let (setting, what) = match bytes {
-            Some(1..=MOST_BYTES) if self.spacing.iter().any(|step| !(step.is_finite() && *step > 0.0)) => {
-                ("spacing", format!("takes numbers above 0, not {:?}", self.spacing))
-            }
-            Some(1..=MOST_BYTES) if !self.origin.iter().all(|at| at.is_finite()) => {
-                ("origin", format!("takes finite numbers, not {:?}", self.origin))
-            }
-            Some(1..=MOST_BYTES) => return Ok(()),
-            _ => ("dims", format!("{:?} voxels are none, or too many", self.dims)),
-        };
-        Err(Error::setting(setting, what))
+        self.grid.whole().voxels() * self.sample.size()
     }
 }
 
 /// Of a frame: so many can have addresses.
 const MOST_BYTES: usize = isize::MAX as usize;
+
+/// The grid of frames, and the coordinates of its voxels if they are irregular along an axis. There, the grid has the mean distance.
+fn placed(given: &WavesplatFrames, listed: [Option<&[f64]>; 3]) -> Result<(Grid, Option<Description>)> {
+    let spacing = given.spacing.map(|step| if step == 0.0 { 1.0 } else { step });
+    let mut grid = Grid { dims: given.dims, spacing, origin: given.origin };
+    for (axis, name) in NAMES.into_iter().enumerate() {
+        let Some(at) = listed[axis] else { continue };
+        grid.origin[axis] = at[0];
+        if at.len() > 1 {
+            grid.spacing[axis] = (at[at.len() - 1] - at[0]) / (at.len() - 1) as f64;
+        }
+        if !at.windows(2).all(|pair| pair[0] < pair[1]) {
+            return Err(Error::setting("coordinates", format!("those along {name} do not ascend")));
+        }
+    }
+    if !grid.spacing.iter().all(|step| step.is_finite() && *step > 0.0) {
+        return Err(Error::setting("spacing", format!("takes numbers above 0, not {:?}", grid.spacing)));
+    }
+    if !grid.origin.iter().all(|at| at.is_finite()) {
+        return Err(Error::setting("origin", format!("takes finite numbers, not {:?}", grid.origin)));
+    }
+    let is_irregular = listed.iter().flatten().any(|at| !is_regular(at));
+    let coordinates = is_irregular.then(|| described(&grid, listed));
+    let size = coordinates.as_ref().map_or(Ok(()), Description::check_size);
+    size.map_err(|e| Error::setting("coordinates", e.to_string()))?;
+    Ok((grid, coordinates))
+}
+
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// The coordinates along z, y and x.
+fn described(grid: &Grid, listed: [Option<&[f64]>; 3]) -> Description {
+    let mut all = Description { source: "frames of a program".into(), ..Description::default() };
+    for (dimension, (axis, role)) in (0..).zip([(2, AxisRole::Z), (1, AxisRole::Y), (0, AxisRole::X)]) {
+        let regular = || (0..grid.dims[axis]).map(|n| grid.origin[axis] + grid.spacing[axis] * n as f64).collect();
+        let at = listed[axis].map_or_else(regular, <[f64]>::to_vec);
+        let name = || NAMES[axis].to_string();
+        all.dimensions.push(Dimension { name: name(), length: at.len() as u64, unlimited: false });
+        all.axes.push(ArrayAxis { dimension, role, reversed: false });
+        let (dimensions, values) = (vec![dimension], Values::floats(&at));
+        all.variables.push(Variable { name: name(), dimensions, values, attributes: Vec::new() });
+    }
+    all
+}
 
 /// The number of a type of samples.
 pub(crate) fn number_of(sample: SampleType) -> u32 {

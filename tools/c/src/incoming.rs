@@ -2,48 +2,83 @@
 
 use crate::frames::Frames;
 use std::io::{self, Read};
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
-use wavesplat::source::{Archive, FrameSource, FrameWindow};
+use wavesplat::base::zeroed::Zeroed;
+use wavesplat::source::{Archive, FrameSource, FrameWindow, copy_box};
 use wavesplat::{Error, Grid, Region, Result};
 
 /// Frames that wait: while one is taken, the next one is copied.
 const WAITING: usize = 1;
 
+/// The samples of a frame, at an address that suits every type of samples.
+#[derive(Default)]
+pub(crate) struct FrameMemory {
+    numbers: Zeroed<u64>,
+    bytes: usize,
+}
+
+impl FrameMemory {
+    /// Memory for a frame of so many bytes; none if the system has none.
+    fn new(bytes: usize) -> Option<Self> {
+        Some(Self { numbers: Zeroed::try_in_small_pages(bytes.div_ceil(size_of::<u64>()))?, bytes })
+    }
+}
+
+impl Deref for FrameMemory {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        &self.numbers.bytes()[..self.bytes]
+    }
+}
+
+impl DerefMut for FrameMemory {
+    fn deref_mut(&mut self) -> &mut [u8] {
+        &mut self.numbers.bytes_mut()[..self.bytes]
+    }
+}
+
 /// The end of the caller.
 pub(crate) struct Outgoing {
-    frames: SyncSender<Vec<u8>>,
-    spare: Receiver<Vec<u8>>,
+    frames: SyncSender<FrameMemory>,
+    times: Sender<f64>,
+    spare: Receiver<FrameMemory>,
     is_abandoned: Arc<AtomicBool>,
 }
 
 /// The end of the conversion.
 pub(crate) struct Incoming {
-    frames: Receiver<Vec<u8>>,
-    spare: Sender<Vec<u8>>,
+    frames: Receiver<FrameMemory>,
+    spare: Sender<FrameMemory>,
     is_abandoned: Arc<AtomicBool>,
-    current: Vec<u8>,
+    current: FrameMemory,
     at: usize,
 }
 
-/// Both ends.
-pub(crate) fn stream() -> (Outgoing, Incoming) {
+/// Both ends. The times of frames come beside them.
+pub(crate) fn stream() -> (Outgoing, Incoming, Receiver<f64>) {
     let ((to_conversion, frames), (back, spare)) = (sync_channel(WAITING), channel());
+    let (times, times_of_frames) = channel();
     let is_abandoned = Arc::<AtomicBool>::default();
-    let incoming = Incoming { frames, spare: back, is_abandoned: is_abandoned.clone(), current: Vec::new(), at: 0 };
-    (Outgoing { frames: to_conversion, spare, is_abandoned }, incoming)
+    let current = FrameMemory::default();
+    let incoming = Incoming { frames, spare: back, is_abandoned: is_abandoned.clone(), current, at: 0 };
+    (Outgoing { frames: to_conversion, times, spare, is_abandoned }, incoming, times_of_frames)
 }
 
 impl Outgoing {
-    /// Memory for a frame: that of an earlier one, if there is one.
-    pub(crate) fn room(&self) -> Vec<u8> {
-        self.spare.try_recv().unwrap_or_default()
+    /// Memory for a frame: that of an earlier one, if there is one. An error if the system has none.
+    pub(crate) fn room(&self, bytes: usize) -> io::Result<FrameMemory> {
+        let spare = self.spare.try_iter().find(|spare| spare.len() == bytes);
+        spare.or_else(|| FrameMemory::new(bytes)).ok_or_else(|| io::ErrorKind::OutOfMemory.into())
     }
 
     /// Waits until the conversion can take a frame. Says whether it still does.
-    pub(crate) fn send(&self, frame: Vec<u8>) -> bool {
-        self.frames.send(frame).is_ok()
+    pub(crate) fn send(&self, frame: FrameMemory, time: Option<f64>) -> bool {
+        let is_timed = time.is_none_or(|time| self.times.send(time).is_ok()); // it comes before the frame
+        is_timed && self.frames.send(frame).is_ok()
     }
 
     /// Ends the stream by an error.
@@ -54,7 +89,7 @@ impl Outgoing {
 
 impl Incoming {
     /// The next frame; none after the last one.
-    fn next(&self) -> io::Result<Option<Vec<u8>>> {
+    fn next(&self) -> io::Result<Option<FrameMemory>> {
         match self.frames.recv() {
             Ok(frame) => Ok(Some(frame)),
             Err(_) if self.is_abandoned.load(Ordering::SeqCst) => Err(io::Error::other("was abandoned")),
@@ -116,12 +151,12 @@ impl FrameSource for InMemory {
 
 /// Some frames, whose memory goes back to the caller's end.
 struct Window {
-    frames: Vec<Vec<u8>>,
+    frames: Vec<FrameMemory>,
     first: usize,
     grid: Grid,
     /// Bytes of a sample.
     size: usize,
-    spare: Sender<Vec<u8>>,
+    spare: Sender<FrameMemory>,
 }
 
 impl FrameWindow for Window {
@@ -130,12 +165,7 @@ impl FrameWindow for Window {
     }
 
     fn read_box(&self, frame: usize, region: &Region, out: &mut [u8]) -> Result<()> {
-        let (frame, whole) = (&self.frames[frame], self.grid.whole());
-        let row = (region.dims()[0] * self.size).max(1);
-        for ((y, z), out) in region.rows().zip(out.chunks_exact_mut(row)) {
-            let start = whole.index([region.start[0], y, z]) * self.size;
-            out.copy_from_slice(&frame[start..start + row]);
-        }
+        copy_box(&self.frames[frame], &self.grid, self.size, region, out);
         Ok(())
     }
 

@@ -11,6 +11,7 @@ mod status;
 mod text;
 mod frames;
 mod incoming;
+mod conversion;
 mod write;
 mod read;
 

@@ -6,11 +6,12 @@ use crate::status::answer;
 use crate::text::{give, pointed, required};
 use std::ffi::{c_char, c_void};
 use std::ptr::null_mut;
+use wavesplat::base::description::coordinates;
 use wavesplat::base::mapped::Access;
 use wavesplat::base::progress::Silent;
 use wavesplat::extract::{ExtractConfig, extract_into};
 use wavesplat::file::CoefficientFile;
-use wavesplat::{Error, Region, Result};
+use wavesplat::{Error, Grid, Region, Result};
 
 /// An open file.
 pub struct WavesplatFile(CoefficientFile);
@@ -103,6 +104,32 @@ pub unsafe extern "C" fn wavesplat_times(
         unsafe { room("times", times, count)? }.copy_from_slice(found);
         Ok(())
     })
+}
+
+/// Gives the places of the voxels along x, y or z, that is axis 0, 1 or 2, at the level of detail.
+///
+/// # Safety
+/// `file` is open. `coordinates` has room for as many numbers as there are voxels along the axis.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_coordinates(file: *const WavesplatFile, axis: usize, coordinates: *mut f64) -> i32 {
+    answer(|| {
+        // SAFETY: the caller's.
+        let WavesplatFile(file) = unsafe { pointed("file", file)? };
+        let count = file.grid.dims.get(axis).ok_or_else(|| Error::value("axis", axis, "is not 0, 1 or 2"))?;
+        let found = along(file, axis)?;
+        // SAFETY: the caller's.
+        unsafe { room("coordinates", coordinates, *count)? }.copy_from_slice(&found);
+        Ok(())
+    })
+}
+
+/// The places of the voxels along an axis: those of the source, or in equal steps.
+fn along(file: &CoefficientFile, axis: usize) -> Result<Vec<f64>> {
+    let Grid { dims, spacing, origin } = file.grid;
+    let listed = file.description()?.and_then(|description| coordinates(&description, axis));
+    let listed = listed.map(|at| at.into_iter().step_by(1 << file.lod()).collect::<Vec<_>>());
+    let regular = || (0..dims[axis]).map(|n| origin[axis] + spacing[axis] * n as f64).collect();
+    Ok(listed.filter(|at| at.len() == dims[axis]).unwrap_or_else(regular))
 }
 
 /// Gives the samples of `count` frames from `first` on, of the voxels from `start` up to but without `end` along x, y and z, or of

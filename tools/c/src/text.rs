@@ -26,6 +26,15 @@ pub(crate) unsafe fn required<'a>(name: &'static str, text: *const c_char) -> Re
     unsafe { optional(name, text) }?.ok_or_else(|| missing(name))
 }
 
+/// Numbers that follow each other; none for null.
+///
+/// # Safety
+/// `numbers` is null or points to `count` of them, which stay as they are for `'a`.
+pub(crate) unsafe fn listed<'a>(numbers: *const f64, count: usize) -> Option<&'a [f64]> {
+    // SAFETY: the caller's.
+    (!numbers.is_null()).then(|| unsafe { std::slice::from_raw_parts(numbers, count) })
+}
+
 /// What a pointer points to, unless it is null.
 ///
 /// # Safety

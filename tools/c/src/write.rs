@@ -1,27 +1,25 @@
-//! A conversion of frames that a running program pushes.
+//! Frames that a running program pushes into a file.
 #![allow(unsafe_code)]
 
+use crate::conversion::{check_place, convert, requested};
 use crate::frames::{Frames, WavesplatFrames, number_of};
-use crate::incoming::{InMemory, Incoming, Outgoing, stream};
+use crate::incoming::{FrameMemory, Outgoing, stream};
 use crate::status::answer;
 use crate::text::{give, optional, pointed, pointed_mut, required};
 use std::ffi::{c_char, c_void};
-use std::io;
-use std::path::{Path, PathBuf, absolute};
+use std::path::{PathBuf, absolute};
 use std::ptr::null_mut;
 use std::thread::{Builder, JoinHandle};
-use wavesplat::base::memory::{self, for_reading};
-use wavesplat::base::progress::Silent;
-use wavesplat::convert::{ConvertRequest, run};
-use wavesplat::file::resume::IfUnfinished;
-use wavesplat::formats;
-use wavesplat::source::{Archive, FrameSource, FrameWindow, GivenTimes, OpenOptions};
 use wavesplat::{Error, Result};
 
 /// A file that is being written.
 pub struct WavesplatWriter {
     frames: Frames,
     path: PathBuf,
+    /// Memory that the caller fills for the next frame.
+    room: Option<FrameMemory>,
+    /// The time of the last frame, if any frame was pushed. It has none if frames have no times of their own.
+    last: Option<Option<f64>>,
     /// None after an error.
     running: Option<Running>,
     /// That error.
@@ -73,7 +71,7 @@ pub unsafe extern "C" fn wavesplat_create(
 /// Adds a frame: copies it, and returns as soon as the conversion can take it.
 ///
 /// `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. Frames are
-/// converted later, a window (usually 32) at a time: an error may be about an earlier frame. After an error the file cannot be
+/// converted later, a window (usually 32) at a time: an error may be about an earlier frame. After such an error the file cannot be
 /// finished; call `wavesplat_finish` or `wavesplat_abandon` to free the writer.
 ///
 /// # Safety
@@ -84,14 +82,39 @@ pub unsafe extern "C" fn wavesplat_push(
     samples: *const c_void,
     strides: *const isize,
 ) -> i32 {
+    // SAFETY: the caller's.
+    answer(|| unsafe { push(writer, None, samples, strides) })
+}
+
+/// As `wavesplat_push`, for a frame with a time of its own, after that of the frame before. Either all frames have one, or none.
+///
+/// # Safety
+/// As of `wavesplat_push`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_push_at(
+    writer: *mut WavesplatWriter,
+    time: f64,
+    samples: *const c_void,
+    strides: *const isize,
+) -> i32 {
+    // SAFETY: the caller's.
+    answer(|| unsafe { push(writer, Some(time), samples, strides) })
+}
+
+/// Gives memory of the library for the next frame, aligned for any sample. It is pushed without a copy: write all samples, x fastest,
+/// and push `samples` with null for `strides`. Do not use it after that.
+///
+/// # Safety
+/// `samples` receives the memory, or null after an error.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn wavesplat_room(writer: *mut WavesplatWriter, samples: *mut *mut c_void) -> i32 {
     answer(|| {
         // SAFETY: the caller's.
-        let (writer, first) = unsafe { (pointed_mut("writer", writer)?, pointed("samples", samples.cast::<u8>())?) };
-        let strides = (!strides.is_null()).then_some(strides.cast::<[isize; 3]>());
+        unsafe { give("samples", samples, null_mut()) }?;
         // SAFETY: the caller's.
-        let strides = strides.map(|strides| unsafe { strides.read_unaligned() });
+        let room = unsafe { pointed_mut("writer", writer) }?.room()?;
         // SAFETY: the caller's.
-        writer.push(|frames, out| unsafe { copy(frames, first, strides, out) })
+        unsafe { give("samples", samples, room.cast()) }
     })
 }
 
@@ -105,7 +128,7 @@ pub unsafe extern "C" fn wavesplat_frame(writer: *const WavesplatWriter, dims: *
         // SAFETY: the caller's.
         let WavesplatWriter { frames, .. } = unsafe { pointed("writer", writer)? };
         // SAFETY: the caller's.
-        unsafe { give("dims", dims.cast(), frames.dims)? };
+        unsafe { give("dims", dims.cast(), frames.grid.dims)? };
         // SAFETY: the caller's.
         unsafe { give("sample", sample, number_of(frames.sample)) }
     })
@@ -149,27 +172,51 @@ impl WavesplatWriter {
         let request = requested(settings)?;
         let path = absolute(path).map_err(|e| Error::io(path, "finding its folder", e))?;
         check_place(&path, replace)?;
-        let (outgoing, incoming) = stream();
+        let (outgoing, incoming, times) = stream();
         let (to, of) = (path.clone(), frames.clone());
-        let conversion = move || convert(incoming, &of, request, &to, replace);
+        let conversion = move || convert(incoming, times, &of, request, &to, replace);
         let conversion = Builder::new().name("wavesplat".into()).spawn(conversion);
         let conversion = conversion.map_err(|e| Error::io(&path, "starting a thread", e))?;
         let running = Some(Running { outgoing, conversion });
-        Ok(Self { frames, path, running, failure: "by a bug in wavesplat".into() })
+        Ok(Self { frames, path, room: None, last: None, running, failure: "by a bug in wavesplat".into() })
     }
 
-    /// Gives the conversion a frame that `fill` writes.
-    fn push(&mut self, fill: impl FnOnce(&Frames, &mut Vec<u8>)) -> Result<()> {
-        let Running { outgoing, .. } = self.running()?;
-        let mut frame = outgoing.room();
-        frame.clear();
-        let room = frame.try_reserve_exact(self.frames.bytes());
-        room.map_err(|e| Error::io(&self.path, "copying a frame", io::Error::new(io::ErrorKind::OutOfMemory, e)))?;
-        fill(&self.frames, &mut frame);
-        if outgoing.send(frame) {
+    /// Gives the conversion a frame.
+    fn push(&mut self, frame: FrameMemory, time: Option<f64>) -> Result<()> {
+        if self.running()?.outgoing.send(frame, time) {
+            self.last = Some(time);
             return Ok(());
         }
         self.stop(false).inspect_err(|error| self.failure = error.to_string())
+    }
+
+    /// Refuses a time that does not follow that of the frame before.
+    fn check_time(&self, time: Option<f64>) -> Result<()> {
+        let what = match (time, self.last) {
+            (Some(_), _) if self.frames.times.is_some() => {
+                "frames have a `time_step`, so none has a time of its own".into()
+            }
+            (Some(time), _) if !time.is_finite() => format!("{time} is not finite"),
+            (Some(time), Some(Some(last))) if time <= last => {
+                format!("{time} is not after {last}, that of the frame before")
+            }
+            (Some(_), Some(None)) => "the frames before have none".into(),
+            (None, Some(Some(_))) => "the frames before have one each, so this one needs one".into(),
+            _ => return Ok(()),
+        };
+        Err(Error::setting("time", what))
+    }
+
+    /// Memory for a frame.
+    fn memory(&self) -> Result<FrameMemory> {
+        let memory = self.running()?.outgoing.room(self.frames.bytes());
+        memory.map_err(|e| Error::io(&self.path, "taking memory for a frame", e))
+    }
+
+    /// The address of the memory that the caller fills for the next frame.
+    fn room(&mut self) -> Result<*mut u8> {
+        let room = self.room.take().map_or_else(|| self.memory(), Ok)?;
+        Ok(self.room.insert(room).as_mut_ptr())
     }
 
     fn end(mut self, is_abandoned: bool) -> Result<()> {
@@ -194,116 +241,53 @@ impl WavesplatWriter {
     }
 }
 
-/// What the settings ask for, as far as pushed frames can have it.
-fn requested(settings: Option<&str>) -> Result<ConvertRequest> {
-    let settings = settings.map(str::trim).filter(|text| !text.is_empty()).unwrap_or("{}");
-    let wrong = |what: String| Error::setting("settings", what);
-    if !settings.starts_with('{') {
-        return Err(wrong("takes an object of JSON, {...}".into()));
+/// Pushes a frame: memory of the library as it is, other samples as a copy.
+///
+/// # Safety
+/// As of [`wavesplat_push`].
+unsafe fn push(
+    writer: *mut WavesplatWriter,
+    time: Option<f64>,
+    samples: *const c_void,
+    strides: *const isize,
+) -> Result<()> {
+    // SAFETY: the caller's.
+    let (writer, first) = unsafe { (pointed_mut("writer", writer)?, pointed("samples", samples.cast::<u8>())?) };
+    writer.check_time(time)?;
+    let is_room = |room: &mut FrameMemory| strides.is_null() && std::ptr::eq(room.as_ptr(), first);
+    if let Some(room) = writer.room.take_if(is_room) {
+        return writer.push(room, time);
     }
-    let request: ConvertRequest = serde_json::from_str(settings).map_err(|e| wrong(e.to_string()))?;
-    if request.shard.is_some() || request.scan.is_some() || request.measures {
-        return Err(wrong("`shard`, `scan` and `measures` are for files of frames".into()));
-    }
-    request.check().map(|()| request)
-}
-
-/// Finds out early whether a file can be written.
-fn check_place(path: &Path, replace: bool) -> Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-        return Err(Error::path(folder, "is no folder"));
-    }
-    if path.is_dir() || path.file_name().is_none() {
-        return Err(Error::path(path, "is a folder"));
-    }
-    for taken in [path.into(), PathBuf::from(format!("{}.part", path.display()))] {
-        if !replace && taken.exists() {
-            return Err(Error::path(taken, "exists already; `replace` replaces it"));
-        }
-    }
-    Ok(())
+    let strides = (!strides.is_null()).then_some(strides.cast::<[isize; 3]>());
+    // SAFETY: the caller's.
+    let strides = strides.map(|strides| unsafe { strides.read_unaligned() });
+    let mut frame = writer.memory()?;
+    // SAFETY: the caller's.
+    unsafe { copy(&writer.frames, first, strides, &mut frame) };
+    writer.push(frame, time)
 }
 
 /// Copies the samples of a frame, x fastest.
 ///
 /// # Safety
 /// `strides` reach all samples of a frame from `first`; without strides, they follow each other.
-unsafe fn copy(frames: &Frames, first: *const u8, strides: Option<[isize; 3]>, out: &mut Vec<u8>) {
-    let (size, [nx, ny, nz]) = (frames.sample.size(), frames.dims);
+unsafe fn copy(frames: &Frames, first: *const u8, strides: Option<[isize; 3]>, out: &mut [u8]) {
+    let (size, [nx, ny, _]) = (frames.sample.size(), frames.grid.dims);
     let row = nx * size;
-    let [x, y, z] = strides.unwrap_or([size, row, row * ny].map(usize::cast_signed));
+    let together = [size, row, row * ny].map(usize::cast_signed);
+    let [x, y, z] = strides.unwrap_or(together);
     // SAFETY: the caller's.
-    let add = |at: isize, bytes: usize, out: &mut Vec<u8>| unsafe {
-        out.extend_from_slice(std::slice::from_raw_parts(first.offset(at), bytes));
+    let read = |at: isize, out: &mut [u8]| unsafe {
+        out.copy_from_slice(std::slice::from_raw_parts(first.offset(at), out.len()));
     };
-    for (k, j) in (0..nz as isize).flat_map(|k| (0..ny as isize).map(move |j| (k, j))) {
-        let start = j * y + k * z;
-        match x == size.cast_signed() {
-            true => add(start, row, out),
-            false => (0..nx as isize).for_each(|i| add(start + i * x, size, out)),
+    if [x, y, z] == together {
+        return read(0, out);
+    }
+    for (n, out) in out.chunks_exact_mut(row).enumerate() {
+        let start = (n % ny).cast_signed() * y + (n / ny).cast_signed() * z;
+        match x == together[0] {
+            true => read(start, out),
+            false => (0..).zip(out.chunks_exact_mut(size)).for_each(|(i, out)| read(start + i * x, out)),
         }
-    }
-}
-
-fn convert(incoming: Incoming, of: &Frames, mut request: ConvertRequest, path: &Path, replace: bool) -> Result<()> {
-    let frames = request.config(&of.archive())?.window.saturating_add(AT_ONCE);
-    let window = frames.saturating_mul(of.bytes());
-    let is_usual = request.memory == memory::DEFAULT && window <= MOST_IN_MEMORY && cfg!(target_endian = "little");
-    if is_usual {
-        request.memory += window;
-    }
-    let source: Box<dyn FrameSource> = match is_usual {
-        true => Box::new(InMemory::new(incoming, of, window)),
-        false => streamed(incoming, of, for_reading(request.memory))?,
-    };
-    let if_unfinished = IfUnfinished::from_flags(replace, false);
-    let done = run(Box::new(Named::new(source, of)), &request, path, replace, if_unfinished, &Silent);
-    done.map(drop).map_err(|failure| failure.error)
-}
-
-/// Frames whose windows may go to a temporary file.
-fn streamed(incoming: Incoming, of: &Frames, memory: usize) -> Result<Box<dyn FrameSource>> {
-    let options = OpenOptions {
-        dims: Some(of.dims.to_vec()),
-        sample: Some(of.sample),
-        big_endian: cfg!(target_endian = "big"),
-        spacing: Some(of.spacing),
-        origin: Some(of.origin),
-        times: of.times.map(GivenTimes::Regular),
-        time_unit: of.times.and(of.time_unit.clone()),
-        memory,
-        ..OpenOptions::default()
-    };
-    formats::open_named_stream("frames", incoming, &options)
-}
-
-/// Frames that are in memory besides a window: one is filled, one waits, and one is taken.
-const AT_ONCE: usize = 3;
-/// Bytes of a window that are taken besides the usual memory.
-const MOST_IN_MEMORY: usize = 1 << 30;
-
-/// A stream with the name and the unit of its samples.
-struct Named {
-    stream: Box<dyn FrameSource>,
-    archive: Archive,
-}
-
-impl Named {
-    fn new(stream: Box<dyn FrameSource>, of: &Frames) -> Self {
-        let mut archive = stream.archive().clone();
-        archive.variable = of.variable.clone();
-        archive.units.samples = of.unit.clone();
-        Self { stream, archive }
-    }
-}
-
-impl FrameSource for Named {
-    fn archive(&self) -> &Archive {
-        &self.archive
-    }
-
-    fn window(&mut self, first: usize, count: usize) -> Result<Box<dyn FrameWindow>> {
-        self.stream.window(first, count)
     }
 }

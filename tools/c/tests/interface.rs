@@ -5,6 +5,7 @@ use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use wavesplat::Grid;
+use wavesplat::base::description::{coordinates, is_of};
 use wavesplat::convert::{ConvertConfig, convert_to_file};
 use wavesplat::source::ArraySource;
 use wavesplat_c::*;
@@ -18,6 +19,7 @@ fn frames() -> WavesplatFrames {
         sample: WAVESPLAT_F32,
         spacing: [0.0; 3],
         origin: [0.0; 3],
+        coordinates: [null(); 3],
         first_time: 0.0,
         time_step: 0.0,
         time_unit: null(),
@@ -104,6 +106,115 @@ fn strides_may_leave_out_and_turn_round() {
     }
     // SAFETY: it is used for the last time.
     unsafe { wavesplat_close(file) };
+}
+
+#[test]
+fn memory_of_the_library_is_taken_as_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, whole) = (folder.path().join("a.wspl"), folder.path().join("b.wspl"));
+    let samples = samples(40);
+    let writer = create(&path, &frames(), r#"{"max_error": 0.01, "window": 32}"#, false).expect("a writer");
+    for (n, frame) in samples.chunks_exact(VOXELS).enumerate() {
+        let mut room = null_mut();
+        // SAFETY: `room` receives memory for a frame, which is filled before it is pushed.
+        unsafe {
+            assert_eq!(wavesplat_room(writer, &raw mut room), WAVESPLAT_OK);
+            let first = room;
+            assert_eq!(
+                (wavesplat_room(writer, &raw mut room), room),
+                (WAVESPLAT_OK, first),
+                "the same until it is pushed"
+            );
+            assert!(room.cast::<f64>().is_aligned());
+            room.cast::<f32>().copy_from_nonoverlapping(frame.as_ptr(), VOXELS);
+        }
+        match n % 3 {
+            0 => assert_eq!(push(writer, frame), WAVESPLAT_OK, "other memory may come between"),
+            // SAFETY: the frame is whole.
+            _ => assert_eq!(unsafe { wavesplat_push(writer, room, null()) }, WAVESPLAT_OK),
+        }
+    }
+    // SAFETY: it is used for the last time.
+    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    let mut source = ArraySource::from_f32(DIMS, &samples).expect("whole frames");
+    convert_to_file(&mut source, &ConvertConfig::with_max_error(0.01), &whole).expect("a file");
+    assert!(std::fs::read(path).expect("a file") == std::fs::read(whole).expect("a file"), "other bytes");
+}
+
+/// Pushes frames with times of their own.
+fn push_at(writer: *mut WavesplatWriter, time: f64, frame: &[f32]) -> i32 {
+    assert_eq!(frame.len(), VOXELS);
+    // SAFETY: the frame is whole.
+    unsafe { wavesplat_push_at(writer, time, frame.as_ptr().cast(), null()) }
+}
+
+#[test]
+fn frames_have_times_of_their_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let samples = samples(50);
+    let times: Vec<f64> = (0..50).map(|n| 0.1 * f64::from(n * n) - 3.0).collect();
+    for memory in ["", r#", "memory": 30000000"#] {
+        let path = folder.path().join("a.wspl");
+        let settings = format!(r#"{{"max_error": 0.01, "window": 8{memory}}}"#);
+        let timed = WavesplatFrames { time_unit: c"s".as_ptr(), ..frames() };
+        let writer = create(&path, &timed, &settings, true).expect("a writer");
+        for (frame, time) in samples.chunks_exact(VOXELS).zip(&times) {
+            assert_eq!(push_at(writer, *time, frame), WAVESPLAT_OK, "{}", message());
+            for wrong in [*time, time - 1.0, f64::NAN, f64::INFINITY] {
+                assert_eq!(push_at(writer, wrong, frame), WAVESPLAT_ARGUMENT, "and the file goes on");
+            }
+            assert_eq!(push(writer, frame), WAVESPLAT_ARGUMENT);
+            assert!(message().contains("needs one"), "{}", message());
+        }
+        // SAFETY: it is used for the last time.
+        assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+        let file = wavesplat::file::CoefficientFile::open(&path).expect("a file");
+        assert_eq!(file.metadata().times, times);
+        assert_eq!(wavesplat::file::setting(file.metadata(), "time-units"), Some("s"));
+    }
+    let regular = WavesplatFrames { time_step: 1.0, ..frames() };
+    for (frames, first, second) in [(regular, None, Some(1.0)), (frames(), None, Some(1.0))] {
+        let writer = create(&folder.path().join("b.wspl"), &frames, "{}", true).expect("a writer");
+        for (time, expected) in [(first, WAVESPLAT_OK), (second, WAVESPLAT_ARGUMENT)] {
+            let frame = &samples[..VOXELS];
+            assert_eq!(time.map_or_else(|| push(writer, frame), |time| push_at(writer, time, frame)), expected);
+        }
+        // SAFETY: it is used for the last time.
+        unsafe { wavesplat_abandon(writer) };
+    }
+}
+
+#[test]
+fn coordinates_are_kept_where_distances_differ() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.wspl");
+    let (x, y) = ([0.0, 1.0, 3.0, 7.0, 8.0, 10.0], [5.0, 5.5, 6.0, 6.5, 7.0]);
+    let stretched =
+        WavesplatFrames { coordinates: [x.as_ptr(), y.as_ptr(), null()], spacing: [9.0, 0.0, 0.25], ..frames() };
+    let writer = create(&path, &stretched, r#"{"window": 8}"#, false).expect("a writer");
+    samples(20).chunks_exact(VOXELS).for_each(|frame| assert_eq!(push(writer, frame), WAVESPLAT_OK));
+    // SAFETY: it is used for the last time.
+    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    let file = wavesplat::file::CoefficientFile::open(&path).expect("a file");
+    assert_eq!(file.grid, Grid { dims: DIMS, spacing: [2.0, 0.5, 0.25], origin: [0.0, 5.0, 0.0] });
+    let description = file.description().expect("it is read").expect("one");
+    let found = [0, 1, 2].map(|axis| coordinates(&description, axis).expect("some"));
+    assert_eq!(found, [x.to_vec(), y.to_vec(), vec![0.0, 0.25, 0.5, 0.75]]);
+    assert!(is_of(&description, DIMS, 20));
+    let (coarse, mut room) = (open(&path, 1).expect("every second voxel"), [0.0; 3]);
+    // SAFETY: there is room for 3.
+    unsafe {
+        assert_eq!(wavesplat_coordinates(coarse, 0, room.as_mut_ptr()), WAVESPLAT_OK);
+        assert_eq!(room, [0.0, 3.0, 8.0]);
+        assert_eq!(wavesplat_coordinates(coarse, 2, room.as_mut_ptr()), WAVESPLAT_OK);
+        assert_eq!(room[..2], [0.0, 0.5]);
+        assert_eq!(wavesplat_coordinates(coarse, 3, room.as_mut_ptr()), WAVESPLAT_ARGUMENT);
+        wavesplat_close(coarse);
+    }
+    for wrong in [[0.0, 1.0, 3.0, 2.0, 8.0, 10.0], [f64::NAN; 6], [0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY]] {
+        let frames = WavesplatFrames { coordinates: [wrong.as_ptr(), null(), null()], ..frames() };
+        assert_eq!(create(&path, &frames, "{}", true).err(), Some(WAVESPLAT_ARGUMENT));
+    }
 }
 
 #[test]

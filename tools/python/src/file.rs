@@ -3,6 +3,7 @@
 
 use crate::errors::raised;
 use crate::look::{Viewer, bytes, page, render_from};
+use crate::object::ObjectStorage;
 use crate::{described, fork, job};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -13,7 +14,7 @@ use std::path::PathBuf;
 use wavesplat::Region;
 use wavesplat::base::address::is_address;
 use wavesplat::base::progress::Silent;
-use wavesplat::extract::{ExtractConfig, extract_into};
+use wavesplat::extract::{ExtractConfig, OutputOfExtraction, extract_into, format_of};
 use wavesplat::file::report::BoundReport;
 use wavesplat::file::{CoefficientFile, setting};
 use wavesplat::picture::{Inputs, Session};
@@ -48,9 +49,25 @@ impl File {
                 true => CoefficientFile::open_remote(&inputs.paths[0], &inputs.remote)?,
                 false => CoefficientFile::open(&inputs.paths[0])?,
             };
-            let whole = whole.keeping_decoded(cache);
-            let session = Session::from_file(whole.clone(), inputs, 0);
-            Ok(Self { file: whole.with_detail(lod)?, session })
+            Self::of(whole, inputs, lod, cache)
+        };
+        fork::call(py, open)
+    }
+
+    /// Opens a file of so many bytes in an object that `read` reads: called with the starts and the ends of ranges, it returns a list
+    /// with the bytes of each. Messages call it `name`.
+    #[staticmethod]
+    fn of_object(
+        py: Python<'_>,
+        name: PathBuf,
+        read: Py<PyAny>,
+        length: u64,
+        lod: u32,
+        cache: usize,
+    ) -> PyResult<Self> {
+        let open = || {
+            let whole = CoefficientFile::from_storage(&name, ObjectStorage::new(read, length))?;
+            Self::of(whole, inputs(name, None)?, lod, cache)
         };
         fork::call(py, open)
     }
@@ -186,7 +203,7 @@ impl File {
 
     /// The source's description; None if the file has none.
     fn description<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let description = self.file.description().map_err(raised)?;
+        let description = fork::call(py, || self.file.description())?;
         description.map(|description| described::to_python(py, &description)).transpose()
     }
 
@@ -216,5 +233,39 @@ impl File {
             false => job::run(py, None, |progress, _| extract_into(&self.file, &config, out, progress))?,
         };
         Ok(())
+    }
+
+    /// Writes the samples of a box of some ascending frames to files, whose format the ending of `output` says. Returns the report as
+    /// JSON, and notes.
+    #[allow(clippy::too_many_arguments, reason = "a method of Python takes them one by one")]
+    #[pyo3(signature = (output, frames, region, channel, memory, overwrite, report = None))]
+    fn extract(
+        &self,
+        py: Python<'_>,
+        output: PathBuf,
+        frames: Vec<usize>,
+        region: ([usize; 3], [usize; 3]),
+        channel: usize,
+        memory: usize,
+        overwrite: bool,
+        report: Option<Py<PyAny>>,
+    ) -> PyResult<(String, Vec<String>)> {
+        let region = Region { start: region.0, end: region.1 };
+        let config = ExtractConfig { frames, region, channel, memory, ..ExtractConfig::new(&self.file) };
+        job::run(py, report.as_ref(), |progress, _| {
+            let output = OutputOfExtraction::new(&self.file, config, &output, format_of(&output)?)?;
+            let notes = output.notes();
+            let report = output.write(overwrite, progress)?;
+            Ok((serde_json::to_string(&report).unwrap_or_default(), notes))
+        })
+    }
+}
+
+impl File {
+    /// A file at a level of detail, whose decoded blocks are kept.
+    fn of(whole: CoefficientFile, inputs: Inputs, lod: u32, cache: usize) -> wavesplat::Result<Self> {
+        let whole = whole.keeping_decoded(cache);
+        let session = Session::from_file(whole.clone(), inputs, 0);
+        Ok(Self { file: whole.with_detail(lod)?, session })
     }
 }

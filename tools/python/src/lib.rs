@@ -14,6 +14,7 @@ mod frames;
 mod job;
 mod look;
 mod named;
+mod object;
 
 use pyo3::prelude::*;
 

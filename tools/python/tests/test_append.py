@@ -52,7 +52,7 @@ def test_what_does_not_fit_is_refused_and_leaves_the_file(tmp_path):
         wavesplat.append(data[16:], path)
     with pytest.raises((ValueError, wavesplat.InputError), match="was begun with|dimensions|volume"):
         wavesplat.append(data[16:, 1:], path, times=times[16:])
-    with pytest.raises(ValueError, match="are for a Dataset"):
+    with pytest.raises(ValueError, match="is for a Dataset"):
         wavesplat.append(data[16:], path, variable="u")
     with pytest.raises(ValueError, match="coordinates of its own"):
         wavesplat.append(xr.Dataset({"u": (("time", "z", "y", "x"), data)}), path, times=times)

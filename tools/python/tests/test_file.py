@@ -6,7 +6,8 @@ import shutil
 
 import numpy as np
 import pytest
-from conftest import SHAPE, smooth
+import xarray as xr
+from conftest import SHAPE, run, smooth
 
 import wavesplat
 
@@ -169,7 +170,7 @@ def test_addresses_of_files(path, decoded, tmp_path):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda file: wavesplat.open(7), "str, bytes or os.PathLike"),
+        (lambda file: wavesplat.open(7), "path: takes a path, an address or a file object, not 7"),
         (lambda file: wavesplat.open(file.path, lod="1"), "lod: takes a whole number, not '1'"),
         (lambda file: file.read(memory="1GiB"), "memory: takes a whole number"),
         (lambda file: file.read(channel=0.5), "channel: takes a whole number"),
@@ -180,3 +181,27 @@ def test_addresses_of_files(path, decoded, tmp_path):
 def test_wrong_types_say_what_is_wanted(file, call, words):
     with pytest.raises(TypeError, match=words):
         call(file)
+
+
+def test_extracting_writes_what_the_program_does(path, decoded, tmp_path):
+    file = wavesplat.open(path)
+    report = file.extract(tmp_path / "part.npy", slice(3, 30, 2), y=slice(4, 9), x=5)
+    assert report["frames"] == 14
+    assert np.array_equal(np.load(tmp_path / "part.npy"), decoded[3:30:2, :, 4:9, 5:6])
+    run("extract", path, "-o", tmp_path / "whole.nc")
+    file.extract(tmp_path / "own.nc")
+    assert (tmp_path / "own.nc").read_bytes() == (tmp_path / "whole.nc").read_bytes()
+    wavesplat.open(path, lod=1).extract(tmp_path / "coarse_%02d.vti", [7, 8])
+    assert sorted(found.name for found in tmp_path.glob("*.vti")) == ["coarse_07.vti", "coarse_08.vti"]
+    for output, key, words in (
+        ("own.nc", {}, "exists"),
+        ("own.foo", {}, "the extension is none of"),
+        ("a.npy", {"y": slice(0, 9, 2)}, "y: takes voxels that follow each other"),
+        ("a.npy", {"z": slice(5, 5)}, "z: takes voxels"),
+        ("a.npy", {"t": [5, 3]}, "ascending"),
+        ("a.npy", {"channel": 1}, "channel"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            file.extract(tmp_path / output, **key)
+    file.extract(tmp_path / "own.nc", 3, overwrite=True)
+    assert len(xr.open_dataset(tmp_path / "own.nc").time) == 1

@@ -255,3 +255,49 @@ def test_arrays_of_devices_and_of_dlpack(tmp_path, small, kind):
     np.testing.assert_array_equal(back(tmp_path / "a.wspl"), small)
     wavesplat.convert((kind(frame) for frame in small), tmp_path / "b.wspl", tolerance=0)
     np.testing.assert_array_equal(back(tmp_path / "b.wspl"), small)
+
+
+@pytest.mark.parametrize(
+    ("axes", "shape"),
+    [
+        ("xyzt", (9, 8, 7, 6)),
+        ("ctzyx", (1, 6, 7, 8, 9)),
+        ("zyxtc", (7, 8, 9, 6, 1)),
+        ("zyx", (7, 8, 9)),
+        ("yx", (8, 9)),
+    ],
+)
+def test_axes_say_what_an_array_counts(tmp_path, axes, shape):
+    samples = np.random.default_rng(3).random(shape).astype(np.float32)
+    place = {letter: n for n, letter in enumerate(axes)}
+    expected = np.empty([shape[place[a]] if a in place else 1 for a in "tzyx"], np.float32)
+    for index in np.ndindex(*expected.shape):
+        expected[index] = samples[tuple(0 if a == "c" else index["tzyx".index(a)] for a in axes)]
+    for name, array in {"numpy": samples, "dask": da.from_array(samples, chunks=3)}.items():
+        path = tmp_path / f"{name}.wspl"
+        wavesplat.convert(array, path, tolerance=0, axes=axes)
+        assert np.array_equal(wavesplat.open(path)[...], expected)
+    if "t" in axes:
+        wavesplat.append(samples, tmp_path / "numpy.wspl", axes=axes, overwrite=True)
+        assert np.array_equal(wavesplat.open(tmp_path / "numpy.wspl")[6:], expected)
+
+
+def test_wrong_axes_are_refused(tmp_path):
+    class Sliced:
+        shape, dtype = (4, 5, 6, 7), np.dtype("f4")
+
+        def __getitem__(self, key):
+            return np.zeros(self.shape, "f4")[key]
+
+    samples = np.zeros((4, 5, 6, 7), "f4")
+    for source, axes, words in (
+        (samples, "zyx", "each axis of the array, which has 4"),
+        (samples, "tzyy", "takes a letter"),
+        (samples, "tzyq", "takes a letter"),
+        (samples, "tczy", r"axis 1 counts no frames .* has 5 items; .*array\[:, n, :, :\]"),
+        (Sliced(), "xyzt", "cannot be transposed"),
+        (iter([samples[0]]), "zyx", "iterable"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            wavesplat.convert(source, tmp_path / "a.wspl", axes=axes)
+    wavesplat.convert(Sliced(), tmp_path / "a.wspl", axes="tzyx")

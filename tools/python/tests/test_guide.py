@@ -4,6 +4,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import fsspec
 import numpy as np
 import pytest
 import xarray as xr
@@ -53,6 +54,28 @@ def test_parts_of_space(tmp_path, monkeypatch):
         whole.isel(y=y, x=x).to_wavesplat(f"rank_{rank}.wspl", tolerance=0)
     (code,) = [code for code in PAGE.read_text().split("`") if "rank_*" in code]
     assert np.array_equal(eval(code, {"xr": xr}).u.values, data)
+
+
+def test_ensembles_and_groups(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data = np.stack([smooth(), smooth(seed=2)])
+    axes = ("member", "time", "z", "y", "x")
+    ds = xr.Dataset({"u": (axes, data), "v": (axes, 2 * data)}, {"member": [3, 5], "time": np.arange(40.0)})
+    names = {"ds": ds}
+    members, groups, objects = blocks("Ensembles")
+    exec(members, names)
+    assert list(names["ensemble"].member) == [3, 5]
+    for name in "u", "v":
+        assert np.abs(names["ensemble"][name] - ds[name]).max() <= 1e-3 * np.ptp(ds[name].values)
+    one = ds.isel(member=0, drop=True)
+    names["tree"] = xr.DataTree.from_dict({"/ocean": one, "/ice": one[["u"]] * 3})
+    exec(groups, names)
+    assert set(names["back"]["ocean"].data_vars) == {"u", "v"}
+    assert np.abs(names["back"]["ice"].u - 3 * one.u).max() <= 3e-3 * np.ptp(one.u.values)
+    one.u.to_wavesplat("run.wspl", tolerance=0)
+    fsspec.filesystem("memory").pipe("/run.wspl", (tmp_path / "run.wspl").read_bytes())
+    exec(objects, names)
+    assert np.array_equal(xr.open_dataset("part.nc").u, one.u[:10, :, :8])
 
 
 def test_zarr(folder):

@@ -272,8 +272,8 @@ def test_ways_to_open(tmp_path):
     with open(path, "rb") as opened:
         xr.testing.assert_equal(xr.open_dataset(opened, engine="wavesplat").thetao, ds.thetao)
     xr.testing.assert_equal(xr.open_dataset(f"file://{path}", engine="wavesplat").thetao, ds.thetao)
-    with pytest.raises(TypeError, match="takes a path or an address"):
-        xr.open_dataset(io.BytesIO(path.read_bytes()), engine="wavesplat")
+    in_memory = xr.open_dataset(io.BytesIO(path.read_bytes()), engine="wavesplat")
+    xr.testing.assert_equal(in_memory.thetao, ds.thetao)
     xr.testing.assert_equal(xr.open_dataset(path, concat_characters=False).thetao, ds.thetao)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # newer versions prefer decode_times

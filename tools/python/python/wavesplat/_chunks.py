@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from . import _wavesplat
 from ._arguments import number, pair, text, whole
+from ._axes import AXES, arranged, checked, others, with_all
 from ._convert import Allowed, settings_of
 from ._frames import bytes_of, sample_of
 
 Array = npt.NDArray[Any]
 
-_AXES = "tzyx"
 _USUAL_AXES = {0: "", 1: "x", 2: "yx", 3: "tyx"}
 
 
@@ -101,24 +101,15 @@ class Chunks:
 
     def letters(self, axes: int) -> str:
         """A letter for each of the axes."""
-        usual = _USUAL_AXES.get(axes, "c" * (axes - len(_AXES)) + _AXES)
-        letters = usual if self.axes is None else self.axes
-        repeated = any(letters.count(letter) > 1 for letter in _AXES)
-        if len(letters) != axes or set(letters) - set(_AXES + "c") or repeated:
-            raise ValueError(
-                f'axes: takes a letter of "tzyxc" for each axis of the array, which has {axes}, not {letters!r}'
-            )
-        return letters
+        usual = _USUAL_AXES.get(axes, "c" * (axes - len(AXES)) + AXES)
+        return checked(usual if self.axes is None else self.axes, axes)
 
     def _runs(self, samples: Array) -> Iterator[Array]:
         """The samples as (time, z, y, x), for each place along other axes."""
         letters = self.letters(samples.ndim)
-        others = [axis for axis, letter in enumerate(letters) if letter == "c"]
-        own = [letters.index(letter) for letter in _AXES if letter in letters]
-        arranged = samples.transpose(others + own)
-        absent = tuple(axis for axis, letter in enumerate(_AXES) if letter not in letters)
-        for place in np.ndindex(*arranged.shape[: len(others)]):
-            yield np.expand_dims(arranged[(*place, ...)], absent)  # a view, of a single sample too
+        turned = arranged(samples, letters)
+        for place in np.ndindex(*turned.shape[: len(others(letters))]):
+            yield turned[with_all(letters, place)]  # a view, of a single sample too
 
     def encoded(self, samples: Array, fill: Any = None) -> bytes:
         """The streams of a chunk of an array with a fill value, if it has one."""

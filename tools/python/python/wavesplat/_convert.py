@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import sys
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
@@ -18,6 +15,7 @@ from . import _wavesplat
 from ._arguments import MEMORY, located, number, pair, text, three, whole
 from ._frames import Frames
 from ._progress import Progress, reporting
+from ._reports import told
 from ._times import Times
 
 
@@ -55,9 +53,10 @@ def convert(
     leaves the finished windows in ``path`` + ".part"; ``resume=True`` continues there.
 
     Args:
-        source: An array of shape (time, z, y, x) or (time, y, x): numpy's, Dask's, Zarr's, netCDF4's or another that can be
-            sliced; an iterable of frames (z, y, x) or (y, x); or a DataArray or Dataset of xarray, of which coordinates,
-            attributes and times are kept. Integers of 64 bits must fit into 32, and booleans become 0 and 1.
+        source: An array of shape (time, z, y, x) or (time, y, x), or as ``axes`` says: numpy's, Dask's, Zarr's, netCDF4's or
+            another that can be sliced; an iterable of frames (z, y, x) or (y, x); or a DataArray or Dataset of xarray, of
+            which coordinates, attributes and times are kept. Integers of 64 bits must fit into 32, and booleans become 0
+            and 1.
         path: The ``.wspl`` file to write. For a Dataset with several variables, "%n" in it stands for the name of each.
         tolerance: The error allowed for each sample, as a share of the range of values; 0 keeps every bit. 0.01 by default.
             A dict gives one for each variable.
@@ -76,8 +75,9 @@ def convert(
             derivatives in space; "curl=E" and "divergence=E", the same if every component of the vector is converted with it;
             "relative=S@F", samples of magnitude F or more are off by at most S times their magnitude.
         variable: Which variable of a Dataset; all that have three axes by default.
-        axes: What each axis of a Dataset's variable counts, slowest first, in letters of "tzyx" ("c" for another); by
-            default that follows from names, attributes and order.
+        axes: What each axis of an array or of a Dataset's variable counts, slowest first, in letters of "tzyx" ("c" for
+            another, of length 1). By default arrays are "tzyx" or "tyx", and for a Dataset that follows from names,
+            attributes and order. To convert an ensemble, convert each member to a file of its own.
         times: The time of each frame, for arrays: ascending numbers, dates or lengths of time, of numpy, cftime or Python.
         time_unit: The unit of ``times``, perhaps since a date: "hours since 2000-01-01".
         spacing: The distance of voxels along x, y and z, for arrays.
@@ -120,10 +120,10 @@ def convert(
                 raise ValueError(f"{name}: a Dataset has coordinates of its own; change those with assign_coords")
         request["shard"] = _shard(shard, range is not None or max_error is not None)
         return convert_dataset(source, given, variable=variable, axes=axes, progress=progress)
-    if variable is not None or axes is not None or shard is not None:
-        raise ValueError("variable, axes and shard are for a Dataset: an array is (time, z, y, x)")
+    if variable is not None or shard is not None:
+        raise ValueError("variable and shard are for a Dataset")
     when = Times.of(times, text("time_unit", time_unit))
-    frames = Frames.of(source, memory, missing)
+    frames = Frames.of(source, memory, missing, axes)
     layout = _layout(frames, when, three("spacing", spacing), three("origin", origin))
     conversion = given.of_variable(None)
     with reporting(progress, "convert") as report:
@@ -177,9 +177,9 @@ def append(
             raise ValueError("times: a Dataset has coordinates of its own; change those with assign_coords")
         name, letters = text("variable", variable), text("axes", axes)
         return append_dataset(source, appending, variable=name, axes=letters, progress=progress)
-    if variable is not None or axes is not None:
-        raise ValueError("variable and axes are for a Dataset: an array is (time, z, y, x)")
-    frames = Frames.of(source, memory, _missing_of(appending.path))
+    if variable is not None:
+        raise ValueError("variable is for a Dataset")
+    frames = Frames.of(source, memory, _missing_of(appending.path), text("axes", axes))
     layout = _layout(frames, Times.of(times, text("time_unit", time_unit)), None, None)
     with reporting(progress, "append") as report:
         return told(*_wavesplat.append_frames(frames.parts, layout, vars(appending), report))
@@ -352,22 +352,6 @@ def _of_variable(name: str, given: float | dict[str, float] | None, variable: st
     if variable not in given:
         raise ValueError(f"{name}: has no entry for {variable or 'an array without a name'}; it has {', '.join(given)}")
     return number(name, given[variable])
-
-
-def told(report: str | None, notes: list[str]) -> dict[str, Any]:
-    """The report of a conversion. Warns of what is worth knowing."""
-    for note in notes:
-        warnings.warn(note, stacklevel=_caller())
-    return json.loads(report) if report is not None else {}
-
-
-def _caller() -> int:
-    """How far up the caller of this package is, for warnings."""
-    folder = os.path.dirname(__file__)
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == folder:
-        frame, level = frame.f_back, level + 1
-    return level
 
 
 def _is_of_xarray(source: Any) -> bool:

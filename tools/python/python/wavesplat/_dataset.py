@@ -11,9 +11,10 @@ import numpy.typing as npt
 import xarray as xr
 
 from . import _wavesplat
-from ._convert import Appending, Conversion, told
+from ._convert import Appending, Conversion
 from ._frames import _chunk, frames_together, little_endian
 from ._progress import Progress, reporting
+from ._reports import told
 
 NAME = "%n"
 """What stands for the name of a variable in the name of a file."""
@@ -84,7 +85,8 @@ def _dataset(source: xr.DataArray | xr.Dataset) -> xr.Dataset:
     if isinstance(source, xr.DataArray):
         return source.to_dataset(name="data" if source.name is None else str(source.name))
     if not isinstance(source, xr.Dataset):
-        raise ValueError(f"source: takes a DataArray or a Dataset, not {type(source).__name__}")
+        what = "; convert the to_dataset() of each group" if type(source).__name__ == "DataTree" else ""
+        raise ValueError(f"source: takes a DataArray or a Dataset, not {type(source).__name__}{what}")
     return source
 
 

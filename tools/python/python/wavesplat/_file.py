@@ -18,10 +18,12 @@ from . import _wavesplat
 from ._arguments import MEMORY, located, whole
 from ._description import Axes, coordinates
 from ._figure import Figure
-from ._index import read_into, select
+from ._index import box_of, read_into, select
+from ._objects import ByteRanges, Place, place_of
 from ._options import request
 from ._pictures import pictures
 from ._progress import Progress, reporting
+from ._reports import told
 from ._viewer import Viewer
 
 if TYPE_CHECKING:
@@ -33,15 +35,14 @@ CACHE = 512 << 20
 """Bytes of decoded blocks that an open file keeps."""
 
 
-def open(
-    path: str | PathLike[str], *, lod: int = 0, cache_dir: str | PathLike[str] | None = None, cache: int = CACHE
-) -> File:
+def open(path: Place, *, lod: int = 0, cache_dir: str | PathLike[str] | None = None, cache: int = CACHE) -> File:
     """Opens a coefficient file, until `File.close` or the end of a ``with``. Samples are read when they are asked for. Blocks
     that were decoded stay in memory for the next reads and pictures, until the file is closed or gone.
 
     Args:
         path: A ``.wspl`` file, or the address of one: ``https://host/run.wspl`` or ``s3://bucket/run.wspl``, as a string.
-            ``file:///folder/run.wspl`` is a path, too.
+            ``file:///folder/run.wspl`` is a path, too. Or a file object that reads bytes and seeks, such as
+            ``fsspec.open("gs://bucket/run.wspl")``; it must stay open.
         lod: Level of detail: every 2**lod-th voxel along each axis, read from the coarse levels alone.
         cache_dir: A folder that keeps what was read of remote files, up to 4 GiB. Several processes may share it.
         cache: Bytes of decoded blocks that stay in memory. A loop over frames is fast if all samples of a window fit.
@@ -49,7 +50,7 @@ def open(
     Raises:
         FileNotFoundError: There is no such file.
         DamagedError: It is damaged, or no coefficient file.
-        ValueError: It has no such level of detail.
+        ValueError: It has no such level of detail, or cannot seek.
 
     """
     return File(path, lod=lod, cache_dir=cache_dir, cache=cache)
@@ -68,7 +69,7 @@ class File:
 
     def __init__(
         self,
-        path: str | PathLike[str],
+        path: Place,
         *,
         lod: int = 0,
         cache_dir: str | PathLike[str] | None = None,
@@ -78,17 +79,29 @@ class File:
         for name, value in ("lod", lod), ("cache", cache):
             if whole(name, value) < 0:
                 raise ValueError(f"{name}: takes 0 or more, not {value}")
-        self._path = located(path)
         self._options: dict[str, Any] = {"lod": lod, "cache_dir": cache_dir, "cache": cache}
-        self._native: _wavesplat.File | None = _wavesplat.File(self._path, **self._options)
+        place = place_of(path)
+        self._object = place if isinstance(place, ByteRanges) else None
+        self._path = place.name if isinstance(place, ByteRanges) else place
+        self._native: _wavesplat.File | None = self._opened()
         self._process = os.getpid()
+
+    def _opened(self) -> _wavesplat.File:
+        if self._object is None:
+            return _wavesplat.File(self._path, **self._options)
+        if self._options["cache_dir"] is not None:
+            raise ValueError("cache_dir: is for addresses; a file object may have a cache of its own")
+        read, lod, cache = self._object, self._options["lod"], self._options["cache"]
+        return _wavesplat.File.of_object(self._path, read, read.length, lod, cache)
 
     @property
     def _file(self) -> _wavesplat.File:
         """The open file. A forked process connects to a server by itself: its parent uses the connection."""
         if self._native is None:
             raise ValueError(f"{self._path}: is closed")
-        if self._process != os.getpid() and "://" in self._path:
+        if self._object is not None:
+            self._object.check_process()
+        elif self._process != os.getpid() and "://" in self._path:
             self._native = _same(self._path, self._native.id, self._options)._file
             self._process = os.getpid()
         return self._native
@@ -109,7 +122,8 @@ class File:
         self.close()
 
     def __reduce__(self) -> tuple[Any, ...]:  # noqa: D105
-        return _same, (anywhere(self._path), self.id, self._options)
+        place = anywhere(self._path) if self._object is None else self._object.file
+        return _same, (place, self.id, self._options)
 
     def __repr__(self) -> str:  # noqa: D105
         if self.closed:
@@ -123,7 +137,7 @@ class File:
 
     @property
     def path(self) -> str:
-        """Its path."""
+        """Its path, or the name of its file object."""
         return self._path
 
     @property
@@ -346,6 +360,48 @@ class File:
         blocks = self._file.block[::-1]
         read_into(out, items, read, blocks=blocks, windows=self._file.windows, memory=memory)
 
+    def extract(
+        self,
+        path: str | PathLike[str],
+        t: Any = slice(None),
+        z: Any = slice(None),
+        y: Any = slice(None),
+        x: Any = slice(None),
+        *,
+        channel: int = 0,
+        overwrite: bool = False,
+        memory: int = MEMORY,
+        progress: Progress = False,
+    ) -> dict[str, Any]:
+        """Writes samples in the format of other programs, a piece at a time: memory stays bounded.
+
+        Args:
+            path: The file, whose ending says the format: ``.npy``, ``.raw``, ``.nrrd``, ``.nhdr``, ``.vti``, ``.vtr``,
+                ``.pvd``, ``.nc``, ``.nii``, ``.nii.gz``, ``.mha`` or ``.zarr``. ``out_%04d.vti`` is one file for each frame.
+            t: Which frames, ascending.
+            z: Which voxels along z, as a number or a slice without a step.
+            y: Which voxels along y.
+            x: Which voxels along x.
+            channel: Which channel, from 0.
+            overwrite: Whether to replace existing files.
+            memory: Bytes that the extraction may take.
+            progress: Whether to show progress, or a function of (done, all).
+
+        Returns:
+            The report, as ``wavesplat extract --json`` prints it, without the names of files.
+
+        Raises:
+            ValueError: The ending is another one, or the file exists already.
+            DamagedError: A block is damaged.
+
+        """
+        frames, *voxels = select((t, z, y, x), self.shape, outer=True).items
+        box = box_of(voxels)
+        region, output = (box[0][::-1], box[1][::-1]), located(path)
+        memory, channel = whole("memory", memory), whole("channel", channel)
+        with reporting(progress, "extract") as report:
+            return told(*self._file.extract(output, list(frames), region, channel, memory, bool(overwrite), report))
+
     def check(self, progress: Progress = False) -> None:
         """Compares the checksums of every byte of the file.
 
@@ -483,9 +539,9 @@ def anywhere(path: str) -> str:
     return path if "://" in path else os.path.abspath(path)
 
 
-def _same(path: str, id: str, options: dict[str, Any]) -> File:
+def _same(path: Place, id: str, options: dict[str, Any]) -> File:
     """A file that is opened again with its options, if it is still the same."""
     file = File(path, **options)
     if file.id != id:
-        raise _wavesplat.ChangedError(f"{path}: is another file than the one that was pickled or opened before")
+        raise _wavesplat.ChangedError(f"{file.path}: is another file than the one that was pickled or opened before")
     return file

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _wavesplat
+from ._axes import arranged, checked, others, with_all
 
 SAMPLES = {"u1": "u8", "i1": "i8", "u2": "u16", "i2": "i16", "u4": "u32", "i4": "i32"} | {
     "f2": "f16",
@@ -36,10 +37,12 @@ class Frames:
     parts: Iterator[npt.NDArray[np.uint8]]
 
     @classmethod
-    def of(cls, source: Any, memory: int, missing: Any) -> Frames:
+    def of(cls, source: Any, memory: int, missing: Any, axes: str | None = None) -> Frames:
         """Those of an array, or of an iterable of frames. ``missing`` says what masked samples become."""
         if hasattr(source, "shape") and hasattr(source, "dtype") and hasattr(source, "__getitem__"):
-            return cls._of_array(source, memory, missing)
+            return cls._of_array(source if axes is None else _in_order(source, axes), memory, missing)
+        if axes is not None:
+            raise ValueError("axes: is for an array or a Dataset; frames of an iterable are (z, y, x) or (y, x)")
         if isinstance(source, (str, bytes, PathLike)):
             raise ValueError("source: takes arrays, not the name of a file; open it, say by xarray.open_dataset")
         if not isinstance(source, Iterable):
@@ -72,6 +75,24 @@ class Frames:
         sample = sample_of(like.dtype)
         parts = (_Part(n, _array(frame)[None], missing).bytes(like.shape, like.dtype) for n, frame in each)
         return cls(_three(list(like.shape)), "source, the frames", sample, parts)
+
+
+def _in_order(array: Any, letters: str) -> Any:
+    """An array with these axes as (time, z, y, x)."""
+    shape, letters = array.shape, checked(letters, len(array.shape))
+    if letters in ("tzyx", "tyx"):
+        return array
+    for axis in others(letters):
+        if shape[axis] != 1:
+            each = ", ".join(["n" if at == axis else ":" for at in range(len(shape))])
+            raise ValueError(
+                f"axes: axis {axis} counts no frames and no voxels, and has {shape[axis]} items; convert each to a file "
+                f"of its own, array[{each}]"
+            )
+    if not hasattr(array, "__array_function__"):
+        name = type(array).__name__
+        raise ValueError(f"axes: {name} cannot be transposed; give numpy.asarray(...) or dask.array.from_array(...)")
+    return arranged(array, letters)[with_all(letters, [0] * len(others(letters)))]
 
 
 def _three(voxels: list[int]) -> list[int]:

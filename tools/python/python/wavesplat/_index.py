@@ -58,6 +58,16 @@ def select(key: Any, shape: Sequence[int], *, outer: bool = False) -> Selection:
     return Selection(items, dropped, new)
 
 
+def box_of(items: Sequence[Items]) -> tuple[list[int], list[int]]:
+    """Where a box of these items along z, y and x starts and stops."""
+    for name, along in zip("zyx", items, strict=True):
+        if len(along) == 0 or np.any(np.diff(along) != 1):
+            raise ValueError(
+                f"{name}: takes voxels that follow each other, at least one; lod= of open() takes every n-th"
+            )
+    return [int(along[0]) for along in items], [int(along[-1]) + 1 for along in items]
+
+
 def _expanded(keys: tuple[Any, ...], axes: int) -> list[slice | Any]:
     """The key with a slice for every axis that it does not name."""
     named = sum(part is not None and part is not Ellipsis for part in keys)

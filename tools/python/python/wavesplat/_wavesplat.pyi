@@ -23,6 +23,10 @@ class File:
     def __init__(
         self, path: str | PathLike[str], lod: int = 0, cache_dir: str | PathLike[str] | None = None, cache: int = ...
     ) -> None: ...
+    @staticmethod
+    def of_object(
+        name: str, read: Callable[[list[int], list[int]], list[bytes]], length: int, lod: int, cache: int
+    ) -> File: ...
     path: str
     id: str
     dims: list[int]
@@ -53,6 +57,16 @@ class File:
         memory: int,
         out: _Bytes,
     ) -> None: ...
+    def extract(
+        self,
+        output: str,
+        frames: Sequence[int],
+        region: tuple[Sequence[int], Sequence[int]],
+        channel: int,
+        memory: int,
+        overwrite: bool,
+        report: _Report | None = None,
+    ) -> tuple[str, list[str]]: ...
     def render(self, request: str, output: str, memory: str, report: _Report | None = None) -> None: ...
     def page(self, request: str, output: str, memory: str) -> None: ...
     def view(self, request: str, port: int, memory: str) -> Viewer: ...

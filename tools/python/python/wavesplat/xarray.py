@@ -12,7 +12,6 @@ import xarray as xr
 from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.core import indexing
 
-from ._arguments import located
 from ._convert import convert
 from ._description import ROLES, along_axis, array, attributes, kept
 from ._file import File, anywhere, open
@@ -84,7 +83,7 @@ class WavesplatBackend(BackendEntrypoint):
         cache_dir: str | os.PathLike[str] | None = None,
     ) -> xr.Dataset:
         """The dataset of a file or an address; with ``lod``, every 2**lod-th voxel along each axis."""
-        file = open(_place(filename_or_obj), lod=lod, cache_dir=cache_dir)
+        file = open(filename_or_obj, lod=lod, cache_dir=cache_dir)
         variables, attrs = variables_of(file)
         dropped = {drop_variables} if isinstance(drop_variables, str) else set(drop_variables or ())
         variables = {name: var for name, var in variables.items() if name not in dropped}
@@ -98,7 +97,7 @@ class WavesplatBackend(BackendEntrypoint):
             concat_characters=concat_characters,
             **given,
         )
-        dataset.encoding["source"] = anywhere(file.path)
+        dataset.encoding["source"] = file.path if file._object is not None else anywhere(file.path)
         return dataset
 
     def open_groups_as_dict(self, filename_or_obj: Any, **options: Any) -> dict[str, xr.Dataset]:
@@ -114,17 +113,6 @@ class WavesplatBackend(BackendEntrypoint):
         return isinstance(filename_or_obj, (str, os.PathLike)) and os.fspath(filename_or_obj).split("?")[0].endswith(
             ".wspl"
         )
-
-
-def _place(of: Any) -> str:
-    """The path or address of what xarray is given: itself, or that of an open file."""
-    if not hasattr(of, "read"):
-        return located(of)
-    known = (getattr(of, name, None) for name in ("url", "path", "name"))
-    place = next((one for one in known if isinstance(one, str) and ("://" in one or os.path.isfile(one))), None)
-    if place is None:
-        raise TypeError(f"filename_or_obj: takes a path or an address, not {of!r}: files are read by parts")
-    return place
 
 
 def variables_of(file: File) -> tuple[dict[str, xr.Variable], dict[str, Any]]:
