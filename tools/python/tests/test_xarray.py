@@ -280,6 +280,19 @@ def test_ways_to_open(tmp_path):
         assert xr.open_dataset(path, use_cftime=True).time.dtype == object
 
 
+def test_axes_without_coordinates_get_none(tmp_path):
+    """Pictures put these voxels as far apart as others, but that is no coordinate."""
+    ds = xr.Dataset(
+        {"u": (("t", "z", "y", "x"), smooth((4, 5, 6, 7)))}, {"x": np.arange(7.0) ** 2, "z": [5.0, 4, 3, 2, 1]}
+    )
+    ds.to_wavesplat(tmp_path / "a.wspl", tolerance=0)
+    back = xr.open_dataset(tmp_path / "a.wspl")
+    xr.testing.assert_equal(back, ds)
+    assert set(wavesplat.open(tmp_path / "a.wspl").coords) == {"z", "x"}
+    wavesplat.convert(smooth((4, 5, 6, 7)), tmp_path / "b.wspl", spacing=(1, 2, 3))
+    assert set(xr.open_dataset(tmp_path / "b.wspl").coords) == {"z", "y"}
+
+
 def test_trees_have_one_node(tmp_path):
     pytest.importorskip("xarray", minversion="2024.10")
     ds = ocean()

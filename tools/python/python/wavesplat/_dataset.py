@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,8 @@ def convert_dataset(
 
     def one(name: str, path: str) -> dict[str, Any]:
         settings = replace(conversion, path=path).of_variable(name)
-        return _one(dataset, name, axes, _wavesplat.convert_arrays, settings, conversion.request["memory"], progress)
+        work = _Work("convert", _wavesplat.convert_arrays, settings, conversion.request["memory"])
+        return work.on(dataset, name, axes, progress)
 
     return _each(names, conversion.path, one)
 
@@ -63,7 +64,8 @@ def append_dataset(
 
     def one(name: str, path: str) -> dict[str, Any]:
         settings = vars(replace(appending, path=path))
-        return _one(dataset, name, axes, _wavesplat.append_arrays, settings, appending.memory, progress)
+        work = _Work("append", _wavesplat.append_arrays, settings, appending.memory)
+        return work.on(dataset, name, axes, progress)
 
     return _each(names, appending.path, one)
 
@@ -110,32 +112,37 @@ def _checked(name: Hashable) -> str:
     return name
 
 
-def _one(
-    dataset: xr.Dataset,
-    name: str,
-    axes: str | None,
-    do: Callable[..., tuple[str | None, list[str]]],
-    settings: dict[str, Any],
-    memory: int,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Gives a variable to the native half, to convert it or to add its frames to a file."""
-    if name not in dataset.data_vars:
-        raise ValueError(f"variable: there is no {name!r}; the dataset has {', '.join(map(str, dataset.data_vars))}")
-    dtype = dataset[name].dtype
-    if dtype.kind not in "fiub":
-        raise ValueError(f"variable: {name!r} has values of type {dtype}, which are no samples; convert them by astype")
-    encoded, attrs = _encoded(dataset, name)
-    unlimited = set(dataset.encoding.get("unlimited_dims", ()))
-    arrays = [_described(key, var, unlimited, memory, key == name) for key, var in encoded.items()]
+@dataclass(frozen=True)
+class _Work:
+    """What the native half does with a variable: it converts it, or adds its frames to a file."""
 
-    def read(array: str, ranges: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
-        part = encoded[array][tuple(slice(start, stop) for start, stop in ranges)]
-        return little_endian(np.asarray(part.values)).reshape(-1).view(np.uint8)
+    name: str
+    do: Callable[..., tuple[str | None, list[str]]]
+    settings: dict[str, Any]
+    memory: int
 
-    chosen = {"source": f"dataset ({name})", "variable": name, "axes": axes}
-    with reporting(progress, f"convert {name}") as report:
-        return told(*do(arrays, _attributes(attrs), read, chosen, settings, report))
+    def on(self, dataset: xr.Dataset, name: str, axes: str | None, progress: Progress) -> dict[str, Any]:
+        """Gives it a variable. Returns the report."""
+        if name not in dataset.data_vars:
+            raise ValueError(
+                f"variable: there is no {name!r}; the dataset has {', '.join(map(str, dataset.data_vars))}"
+            )
+        dtype = dataset[name].dtype
+        if dtype.kind not in "fiub":
+            raise ValueError(
+                f"variable: {name!r} has values of type {dtype}, which are no samples; convert them by astype"
+            )
+        encoded, attrs = _encoded(dataset, name)
+        unlimited = set(dataset.encoding.get("unlimited_dims", ()))
+        arrays = [_described(key, var, unlimited, self.memory, key == name) for key, var in encoded.items()]
+
+        def read(array: str, ranges: Sequence[tuple[int, int]]) -> npt.NDArray[np.uint8]:
+            part = encoded[array][tuple(slice(start, stop) for start, stop in ranges)]
+            return little_endian(np.asarray(part.values)).reshape(-1).view(np.uint8)
+
+        chosen = {"source": f"dataset ({name})", "variable": name, "axes": axes}
+        with reporting(progress, f"{self.name} {name}") as report:
+            return told(*self.do(arrays, _attributes(attrs), read, chosen, self.settings, report))
 
 
 def _encoded(dataset: xr.Dataset, name: str) -> tuple[dict[str, xr.Variable], dict[Hashable, Any]]:

@@ -109,19 +109,26 @@ def coordinates(file: File) -> dict[str, npt.NDArray[Any]]:
 
 def along_axis(file: File, axis: SourceAxis) -> npt.NDArray[Any] | None:
     """The coordinates of an axis in the order of the source: its own, the times of frames, or those of a grid."""
-    described = file.description or {"variables": [], "dimensions": []}
-    for name, dimensions, values, _ in described["variables"]:
-        if name == axis.name and [described["dimensions"][at][0] for at in dimensions] == [axis.name]:
-            own = array(values)
-            return file.times if own is None else own[kept(file, axis, len(own))]
+    listed = _listed(file)
+    if axis.name in listed:
+        own = array(listed[axis.name])
+        return file.times if own is None else own[kept(file, axis, len(own))]
     if axis.role == "t":
         return file.times if len(file.times) else None
-    if axis.role in ("z", "y", "x"):
+    is_placed = not any(other.name in listed for other in file._axes.source if other.role in ("z", "y", "x"))
+    if axis.role in ("z", "y", "x") and is_placed:  # otherwise the source only numbers the voxels of this axis
         along = "xyz".index(axis.role)
         if _is_placed(file, along):
             line = regular(file, along)
             return line[::-1] if axis.reversed else line
     return None
+
+
+def _listed(file: File) -> dict[str, Any]:
+    """The values of coordinates that the source has, by the name of their axis."""
+    described = file.description or {"variables": [], "dimensions": []}
+    names = [name for name, *_ in described["dimensions"]]
+    return {name: values for name, along, values, _ in described["variables"] if [names[at] for at in along] == [name]}
 
 
 def kept(file: File, axis: SourceAxis, length: int) -> slice:
