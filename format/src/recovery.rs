@@ -56,6 +56,8 @@ pub struct Recovered {
     pub left_behind: u64,
     /// Whether it is certain that there were no more windows.
     pub all_known: bool,
+    /// Whether the file had a description that is lost. One that was not finished has none yet.
+    pub description_lost: bool,
 }
 
 /// The sections found in a file.
@@ -193,7 +195,8 @@ impl Recovery {
         }
         let (out, summary) = writer.finish_described(self.description.as_ref())?;
         let (undescribed, left_behind, all_known) = (self.undescribed.clone(), self.left_behind, self.all_known);
-        Ok((out, Recovered { summary, lost, undescribed, left_behind, all_known }))
+        let description_lost = self.features.described && self.description.is_none();
+        Ok((out, Recovered { summary, lost, undescribed, left_behind, all_known, description_lost }))
     }
 
     /// The totals of a window. If they were found, these without the counts of lost blocks; otherwise the sums over the

@@ -79,9 +79,10 @@ typedef struct WavesplatFrames {
   double spacing[3];
   // The place of the first voxel.
   double origin[3];
-  // The places of all voxels along x, y and z where their distances differ: ascending, as many as there are voxels; or null.
+  // The places of all voxels along x, y and z where their distances differ: ascending, as many as there are voxels; or null. They
+  // take the place of spacing and origin, and are stored when a file is finished: recovered ones lack them.
   const double *coordinates[3];
-  // The time of the first frame.
+  // The time of the first frame, if there is a `time_step`.
   double first_time;
   // The time from each frame to the next; 0 if frames have no times, or each is pushed with its own.
   double time_step;
@@ -105,7 +106,7 @@ typedef struct WavesplatInfo {
   uint32_t sample;
   // Bytes of a sample.
   size_t sample_bytes;
-  // The distance of voxels along x, y and z.
+  // The distance of voxels along x, y and z; the mean if distances differ, which `wavesplat_coordinates` tells.
   double spacing[3];
   // The place of the first voxel.
   double origin[3];
@@ -145,7 +146,7 @@ int32_t wavesplat_create(const char *path,
                          int32_t replace,
                          struct WavesplatWriter **writer);
 
-// Adds a frame: copies it, and returns as soon as the conversion can take it.
+// Adds a frame, and returns as soon as the conversion can take it. The frame is copied, unless it is in memory of `wavesplat_room`.
 //
 // `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. Frames are
 // converted later, a window (usually 32) at a time: an error may be about an earlier frame. After such an error the file cannot be
@@ -165,7 +166,7 @@ int32_t wavesplat_push_at(struct WavesplatWriter *writer,
                           const ptrdiff_t *strides);
 
 // Gives memory of the library for the next frame, aligned for any sample. It is pushed without a copy: write all samples, x fastest,
-// and push `samples` with null for `strides`. Do not use it after that.
+// and push `samples` with null for `strides`. Do not use it after a push that succeeds, or after an error of the conversion.
 //
 // `samples` receives the memory, or null after an error.
 int32_t wavesplat_room(struct WavesplatWriter *writer,

@@ -100,8 +100,9 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     let output = OutputOfExtraction::new(&file, config, &args.output, format)?;
     let paths = output.paths();
     paths.iter().try_for_each(|path| spare_inputs(std::slice::from_ref(&args.file), path))?;
-    output.notes().iter().for_each(|note| args.common.note(note));
+    let notes = output.notes();
     let report = output.write(args.force, &args.common.progress("extract", "frames"))?;
+    notes.iter().for_each(|note| args.common.note(note));
     args.common.detail_read(report.file_bytes_read, report.file_bytes);
     args.common.report(&Extracted { report, files: paths }, args.output == Path::new(STANDARD))?;
     file.refuse_skipped()

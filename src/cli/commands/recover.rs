@@ -87,6 +87,9 @@ fn text(r: &RecoverReport) -> String {
     for window in &r.windows_undescribed {
         text += &format!("  the record of window {window} is lost\n");
     }
+    if r.description_lost {
+        text += "  lost: the coordinates and attributes of the source, which are written at the end of a conversion\n";
+    }
     if r.blocks_left_behind > 0 {
         text += &format!("  left out: {} blocks of later windows without a record\n", r.blocks_left_behind);
     }

@@ -241,12 +241,23 @@ pub fn coordinates(description: &Description, along: usize) -> Option<Vec<f64>> 
     let axis = description.axes.iter().find(|axis| axis.role.voxels() == Some(along))?;
     let name = &description.dimensions[axis.dimension as usize].name;
     let own = |variable: &&Variable| variable.name == *name && variable.dimensions == [axis.dimension];
-    let Values::Numbers(numbers) = &description.variables.iter().find(own)?.values else { return None };
-    let mut at = numbers.to_f64();
+    let variable = description.variables.iter().find(own)?;
+    let Values::Numbers(numbers) = &variable.values else { return None };
+    let number = |name| first_number(&variable.attributes, name);
+    let (scale, offset) = (number("scale_factor").unwrap_or(1.0), number("add_offset").unwrap_or(0.0));
+    let mut at: Vec<f64> = numbers.to_f64().into_iter().map(|stored| stored * scale + offset).collect();
     if axis.reversed {
         at.reverse();
     }
     Some(at)
+}
+
+/// The first number of an attribute.
+fn first_number(attributes: &[Attribute], name: &str) -> Option<f64> {
+    match &attributes.iter().find(|attribute| attribute.name == name)?.value {
+        Values::Numbers(numbers) => numbers.to_f64().first().copied(),
+        _ => None,
+    }
 }
 
 /// The sides of a patient that the first and the last voxel along an axis lie towards: L, R, A, P, S or I. `None` unless the source says so, and

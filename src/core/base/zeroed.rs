@@ -29,18 +29,19 @@ impl<T: Pod> Zeroed<T> {
     }
 
     fn in_pages(len: usize, are_huge: bool) -> Self {
-        Self::mapped(len, are_huge).unwrap_or_else(|| Self::Heap(vec![T::zeroed(); len]))
+        Self::try_in_pages(len, are_huge).unwrap_or_else(|| Self::Heap(vec![T::zeroed(); len]))
     }
 
     /// As [`Self::in_small_pages`]; none if the system has no memory for a large buffer.
     pub fn try_in_small_pages(len: usize) -> Option<Self> {
-        let is_large = len.checked_mul(size_of::<T>())? >= LARGE;
-        if is_large { Self::mapped(len, false) } else { Some(Self::in_small_pages(len)) }
+        Self::try_in_pages(len, false)
     }
 
-    /// A large buffer; none if it is small, or if the system has no memory for it.
-    fn mapped(len: usize, are_huge: bool) -> Option<Self> {
-        let bytes = Some(len * size_of::<T>()).filter(|bytes| *bytes >= LARGE)?;
+    fn try_in_pages(len: usize, are_huge: bool) -> Option<Self> {
+        let bytes = len.checked_mul(size_of::<T>())?;
+        if bytes < LARGE {
+            return Some(Self::Heap(vec![T::zeroed(); len]));
+        }
         let map = MmapMut::map_anon(bytes).ok()?;
         advise(&map, are_huge);
         Some(Self::Map(map, len))

@@ -30,6 +30,8 @@ pub struct RecoverReport {
     pub blocks_left_behind: u64,
     /// Whether it is certain that there were no more windows.
     pub all_known: bool,
+    /// Whether the coordinates and the attributes of the source are lost.
+    pub description_lost: bool,
 }
 
 /// Some blocks of a window, one after another.
@@ -96,5 +98,6 @@ pub fn recover(
         windows_undescribed: saved.undescribed,
         blocks_left_behind: saved.left_behind,
         all_known: saved.all_known,
+        description_lost: saved.description_lost,
     })
 }

@@ -3,9 +3,7 @@
 
 use crate::text;
 use std::ffi::c_char;
-use wavesplat::base::description::{
-    ArrayAxis, AxisRole, Description, Dimension, Values, Variable, is_regular, with_frames,
-};
+use wavesplat::base::description::{ArrayAxis, AxisRole, Description, Dimension, Values, Variable, with_frames};
 use wavesplat::base::sample::SampleType;
 use wavesplat::source::{Archive, RegularTimes};
 use wavesplat::{Error, Grid, Result};
@@ -41,9 +39,10 @@ pub struct WavesplatFrames {
     pub spacing: [f64; 3],
     /// The place of the first voxel.
     pub origin: [f64; 3],
-    /// The places of all voxels along x, y and z where their distances differ: ascending, as many as there are voxels; or null.
+    /// The places of all voxels along x, y and z where their distances differ: ascending, as many as there are voxels; or null. They
+    /// take the place of spacing and origin, and are stored when a file is finished: recovered ones lack them.
     pub coordinates: [*const f64; 3],
-    /// The time of the first frame.
+    /// The time of the first frame, if there is a `time_step`.
     pub first_time: f64,
     /// The time from each frame to the next; 0 if frames have no times, or each is pushed with its own.
     pub time_step: f64,
@@ -81,10 +80,17 @@ impl Frames {
         // SAFETY: the caller's.
         let text = |name, text| unsafe { text::optional(name, text) }.map(|text| text.map(String::from));
         let is_timed = given.time_step != 0.0;
-        let times = is_timed.then(|| RegularTimes::new(given.first_time, given.time_step)).transpose()?;
+        let times = is_timed.then(|| RegularTimes::new(given.first_time, given.time_step)).transpose();
+        let times = times.map_err(|_| {
+            let what = format!(
+                "takes steps above 0 after a finite `first_time`, not {} after {}",
+                given.time_step, given.first_time
+            );
+            Error::setting("time_step", what)
+        })?;
         // SAFETY: the caller's.
-        let listed = [0, 1, 2].map(|axis| unsafe { text::listed(given.coordinates[axis], given.dims[axis]) });
-        let (grid, coordinates) = placed(given, listed)?;
+        let listed = |axis: usize| unsafe { text::listed("coordinates", given.coordinates[axis], given.dims[axis]) };
+        let (grid, coordinates) = placed(given, [listed(0)?, listed(1)?, listed(2)?])?;
         Ok(Self {
             grid,
             sample,
@@ -119,17 +125,15 @@ impl Frames {
 const MOST_BYTES: usize = isize::MAX as usize;
 
 /// The grid of frames, and the coordinates of its voxels if they are irregular along an axis. There, the grid has the mean distance.
-fn placed(given: &WavesplatFrames, listed: [Option<&[f64]>; 3]) -> Result<(Grid, Option<Description>)> {
+fn placed(given: &WavesplatFrames, listed: [Option<Vec<f64>>; 3]) -> Result<(Grid, Option<Description>)> {
     let spacing = given.spacing.map(|step| if step == 0.0 { 1.0 } else { step });
     let mut grid = Grid { dims: given.dims, spacing, origin: given.origin };
-    for (axis, name) in NAMES.into_iter().enumerate() {
-        let Some(at) = listed[axis] else { continue };
+    for (axis, at) in listed.iter().enumerate() {
+        let Some(at) = at else { continue };
+        check_coordinates(NAMES[axis], at)?;
         grid.origin[axis] = at[0];
         if at.len() > 1 {
             grid.spacing[axis] = (at[at.len() - 1] - at[0]) / (at.len() - 1) as f64;
-        }
-        if !at.windows(2).all(|pair| pair[0] < pair[1]) {
-            return Err(Error::setting("coordinates", format!("those along {name} do not ascend")));
         }
     }
     if !grid.spacing.iter().all(|step| step.is_finite() && *step > 0.0) {
@@ -138,21 +142,34 @@ fn placed(given: &WavesplatFrames, listed: [Option<&[f64]>; 3]) -> Result<(Grid,
     if !grid.origin.iter().all(|at| at.is_finite()) {
         return Err(Error::setting("origin", format!("takes finite numbers, not {:?}", grid.origin)));
     }
-    let is_irregular = listed.iter().flatten().any(|at| !is_regular(at));
-    let coordinates = is_irregular.then(|| described(&grid, listed));
-    let size = coordinates.as_ref().map_or(Ok(()), Description::check_size);
-    size.map_err(|e| Error::setting("coordinates", e.to_string()))?;
+    let is_irregular = |axis: usize| listed[axis].as_ref().is_some_and(|at| *at != regular(&grid, axis));
+    let coordinates = (0..3).any(is_irregular).then(|| described(&grid, listed));
+    let all = coordinates.as_ref().map(|coordinates| with_frames(coordinates.clone(), usize::MAX));
+    let size = all.as_ref().map_or(Ok(()), Description::check_size);
+    size.map_err(|e| Error::setting("coordinates", format!("take too much room in a file: {e}")))?;
     Ok((grid, coordinates))
 }
 
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
+fn check_coordinates(axis: &str, at: &[f64]) -> Result<()> {
+    let length = at[at.len() - 1] - at[0];
+    if !length.is_finite() || !at.windows(2).all(|pair| pair[0] < pair[1]) {
+        return Err(Error::setting("coordinates", format!("those along {axis} are not finite numbers that ascend")));
+    }
+    Ok(())
+}
+
+/// Coordinates in equal steps.
+fn regular(grid: &Grid, axis: usize) -> Vec<f64> {
+    (0..grid.dims[axis]).map(|n| grid.origin[axis] + grid.spacing[axis] * n as f64).collect()
+}
+
 /// The coordinates along z, y and x.
-fn described(grid: &Grid, listed: [Option<&[f64]>; 3]) -> Description {
+fn described(grid: &Grid, mut listed: [Option<Vec<f64>>; 3]) -> Description {
     let mut all = Description { source: "frames of a program".into(), ..Description::default() };
     for (dimension, (axis, role)) in (0..).zip([(2, AxisRole::Z), (1, AxisRole::Y), (0, AxisRole::X)]) {
-        let regular = || (0..grid.dims[axis]).map(|n| grid.origin[axis] + grid.spacing[axis] * n as f64).collect();
-        let at = listed[axis].map_or_else(regular, <[f64]>::to_vec);
+        let at = listed[axis].take().unwrap_or_else(|| regular(grid, axis));
         let name = || NAMES[axis].to_string();
         all.dimensions.push(Dimension { name: name(), length: at.len() as u64, unlimited: false });
         all.axes.push(ArrayAxis { dimension, role, reversed: false });

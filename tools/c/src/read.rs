@@ -30,7 +30,7 @@ pub struct WavesplatInfo {
     pub sample: u32,
     /// Bytes of a sample.
     pub sample_bytes: usize,
-    /// The distance of voxels along x, y and z.
+    /// The distance of voxels along x, y and z; the mean if distances differ, which `wavesplat_coordinates` tells.
     pub spacing: [f64; 3],
     /// The place of the first voxel.
     pub origin: [f64; 3],

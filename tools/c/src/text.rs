@@ -29,10 +29,16 @@ pub(crate) unsafe fn required<'a>(name: &'static str, text: *const c_char) -> Re
 /// Numbers that follow each other; none for null.
 ///
 /// # Safety
-/// `numbers` is null or points to `count` of them, which stay as they are for `'a`.
-pub(crate) unsafe fn listed<'a>(numbers: *const f64, count: usize) -> Option<&'a [f64]> {
+/// `numbers` is null or points to `count` of them.
+pub(crate) unsafe fn listed(name: &'static str, numbers: *const f64, count: usize) -> Result<Option<Vec<f64>>> {
+    if numbers.is_null() {
+        return Ok(None);
+    }
+    if count.checked_mul(size_of::<f64>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
+        return Err(Error::setting(name, format!("{count} are too many")));
+    }
     // SAFETY: the caller's.
-    (!numbers.is_null()).then(|| unsafe { std::slice::from_raw_parts(numbers, count) })
+    Ok(Some((0..count).map(|n| unsafe { numbers.add(n).read_unaligned() }).collect()))
 }
 
 /// What a pointer points to, unless it is null.

@@ -6,6 +6,7 @@ use crate::frames::{Frames, WavesplatFrames, number_of};
 use crate::incoming::{FrameMemory, Outgoing, stream};
 use crate::status::answer;
 use crate::text::{give, optional, pointed, pointed_mut, required};
+use std::collections::HashSet;
 use std::ffi::{c_char, c_void};
 use std::path::{PathBuf, absolute};
 use std::ptr::null_mut;
@@ -18,12 +19,21 @@ pub struct WavesplatWriter {
     path: PathBuf,
     /// Memory that the caller fills for the next frame.
     room: Option<FrameMemory>,
-    /// The time of the last frame, if any frame was pushed. It has none if frames have no times of their own.
-    last: Option<Option<f64>>,
+    /// All such memory that was given, which stays with the writer.
+    given: HashSet<usize>,
+    last: LastFrame,
     /// None after an error.
     running: Option<Running>,
     /// That error.
     failure: String,
+}
+
+/// The frame that was pushed last.
+#[derive(Debug, Clone, Copy)]
+enum LastFrame {
+    None,
+    Untimed,
+    At(f64),
 }
 
 struct Running {
@@ -68,7 +78,7 @@ pub unsafe extern "C" fn wavesplat_create(
     })
 }
 
-/// Adds a frame: copies it, and returns as soon as the conversion can take it.
+/// Adds a frame, and returns as soon as the conversion can take it. The frame is copied, unless it is in memory of `wavesplat_room`.
 ///
 /// `strides` are the bytes from a sample to the next along x, y and z; null if they follow each other, x fastest. Frames are
 /// converted later, a window (usually 32) at a time: an error may be about an earlier frame. After such an error the file cannot be
@@ -102,7 +112,7 @@ pub unsafe extern "C" fn wavesplat_push_at(
 }
 
 /// Gives memory of the library for the next frame, aligned for any sample. It is pushed without a copy: write all samples, x fastest,
-/// and push `samples` with null for `strides`. Do not use it after that.
+/// and push `samples` with null for `strides`. Do not use it after a push that succeeds, or after an error of the conversion.
 ///
 /// # Safety
 /// `samples` receives the memory, or null after an error.
@@ -178,13 +188,21 @@ impl WavesplatWriter {
         let conversion = Builder::new().name("wavesplat".into()).spawn(conversion);
         let conversion = conversion.map_err(|e| Error::io(&path, "starting a thread", e))?;
         let running = Some(Running { outgoing, conversion });
-        Ok(Self { frames, path, room: None, last: None, running, failure: "by a bug in wavesplat".into() })
+        Ok(Self {
+            frames,
+            path,
+            room: None,
+            given: HashSet::new(),
+            last: LastFrame::None,
+            running,
+            failure: "by a bug in wavesplat".into(),
+        })
     }
 
     /// Gives the conversion a frame.
     fn push(&mut self, frame: FrameMemory, time: Option<f64>) -> Result<()> {
         if self.running()?.outgoing.send(frame, time) {
-            self.last = Some(time);
+            self.last = time.map_or(LastFrame::Untimed, LastFrame::At);
             return Ok(());
         }
         self.stop(false).inspect_err(|error| self.failure = error.to_string())
@@ -197,11 +215,11 @@ impl WavesplatWriter {
                 "frames have a `time_step`, so none has a time of its own".into()
             }
             (Some(time), _) if !time.is_finite() => format!("{time} is not finite"),
-            (Some(time), Some(Some(last))) if time <= last => {
+            (Some(time), LastFrame::At(last)) if time <= last => {
                 format!("{time} is not after {last}, that of the frame before")
             }
-            (Some(_), Some(None)) => "the frames before have none".into(),
-            (None, Some(Some(_))) => "the frames before have one each, so this one needs one".into(),
+            (Some(_), LastFrame::Untimed) => "the frames before have none".into(),
+            (None, LastFrame::At(_)) => "the frames before have one each, so this one needs one".into(),
             _ => return Ok(()),
         };
         Err(Error::setting("time", what))
@@ -216,7 +234,9 @@ impl WavesplatWriter {
     /// The address of the memory that the caller fills for the next frame.
     fn room(&mut self) -> Result<*mut u8> {
         let room = self.room.take().map_or_else(|| self.memory(), Ok)?;
-        Ok(self.room.insert(room).as_mut_ptr())
+        let first = self.room.insert(room).as_mut_ptr();
+        self.given.insert(first.addr());
+        Ok(first)
     }
 
     fn end(mut self, is_abandoned: bool) -> Result<()> {
@@ -254,9 +274,12 @@ unsafe fn push(
     // SAFETY: the caller's.
     let (writer, first) = unsafe { (pointed_mut("writer", writer)?, pointed("samples", samples.cast::<u8>())?) };
     writer.check_time(time)?;
-    let is_room = |room: &mut FrameMemory| strides.is_null() && std::ptr::eq(room.as_ptr(), first);
-    if let Some(room) = writer.room.take_if(is_room) {
+    let is_here = |room: &FrameMemory| std::ptr::eq(room.as_ptr(), first);
+    if let Some(room) = writer.room.take_if(|room| strides.is_null() && is_here(room)) {
         return writer.push(room, time);
+    }
+    if writer.given.contains(&std::ptr::from_ref(first).addr()) && !writer.room.as_ref().is_some_and(is_here) {
+        return Err(Error::setting("samples", "is memory that was pushed before; ask wavesplat_room for more"));
     }
     let strides = (!strides.is_null()).then_some(strides.cast::<[isize; 3]>());
     // SAFETY: the caller's.

@@ -130,8 +130,11 @@ fn memory_of_the_library_is_taken_as_it_is() {
         }
         match n % 3 {
             0 => assert_eq!(push(writer, frame), WAVESPLAT_OK, "other memory may come between"),
-            // SAFETY: the frame is whole.
-            _ => assert_eq!(unsafe { wavesplat_push(writer, room, null()) }, WAVESPLAT_OK),
+            // SAFETY: the frame is whole, and still there when it is refused.
+            _ => unsafe {
+                assert_eq!(wavesplat_push(writer, room, null()), WAVESPLAT_OK);
+                assert_eq!(wavesplat_push(writer, room, null()), WAVESPLAT_ARGUMENT, "a second time");
+            },
         }
     }
     // SAFETY: it is used for the last time.
@@ -214,7 +217,12 @@ fn coordinates_are_kept_where_distances_differ() {
     for wrong in [[0.0, 1.0, 3.0, 2.0, 8.0, 10.0], [f64::NAN; 6], [0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY]] {
         let frames = WavesplatFrames { coordinates: [wrong.as_ptr(), null(), null()], ..frames() };
         assert_eq!(create(&path, &frames, "{}", true).err(), Some(WAVESPLAT_ARGUMENT));
+        assert!(message().starts_with("coordinates: those along x"), "{}", message());
     }
+    let many: Vec<f64> = (0..(1 << 21) - 30).map(|n| f64::from(n) * f64::from(n)).collect();
+    let long = WavesplatFrames { dims: [many.len(), 1, 1], coordinates: [many.as_ptr(), null(), null()], ..frames() };
+    assert_eq!(create(&path, &long, "{}", true).err(), Some(WAVESPLAT_ARGUMENT), "before any frame is pushed");
+    assert!(message().contains("too much room"), "{}", message());
 }
 
 #[test]

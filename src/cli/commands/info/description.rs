@@ -21,7 +21,9 @@ pub(super) fn text(description: &Description, verbose: bool) -> String {
     if description.orientation.is_some() {
         let _ = writeln!(text, "           the directions of the axes are kept");
     }
-    let others: Vec<&str> = description.variables.iter().map(|variable| variable.name.as_str()).collect();
+    let shown_above = |name: &String| (0..3).any(|along| name_along(description, along) == Some(name));
+    let names = description.variables.iter().map(|variable| &variable.name);
+    let others: Vec<&str> = names.filter(|name| !shown_above(name)).map(String::as_str).collect();
     if !others.is_empty() {
         let _ = writeln!(text, "beside     {}", others.join(", "));
     }
@@ -43,10 +45,10 @@ fn axes(description: &Description) -> String {
 /// Name, coordinates and unit of an axis of voxels that has coordinates.
 fn axis_line(description: &Description, along: usize) -> Option<String> {
     let at = coordinates(description, along)?;
-    let dimension = description.axes.iter().find(|axis| axis.role.voxels() == Some(along))?.dimension;
-    let name = &description.dimensions[dimension as usize].name;
+    let name = name_along(description, along)?;
     let variable = description.variables.iter().find(|variable| variable.name == *name)?;
-    let unit = variable.attributes.iter().find(|attribute| attribute.name == "units").map(|unit| shown(&unit.value));
+    let unit = variable.attributes.iter().find(|attribute| attribute.name == "units");
+    let unit = unit.map_or(String::new(), |unit| format!(" {}", shown(&unit.value)));
     let (first, last) = (at.first()?, at.last()?);
     let steps: Vec<f64> = at.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     let (least, largest) = steps.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), step| (a.min(*step), b.max(*step)));
@@ -56,7 +58,13 @@ fn axis_line(description: &Description, along: usize) -> Option<String> {
     };
     let letter = ["x", "y", "z"][along];
     let shown_name = if name == letter { letter.to_string() } else { format!("{letter} is {name}") };
-    Some(format!("{shown_name}: {first} to {last} {}{irregular}", unit.unwrap_or_default()))
+    Some(format!("{shown_name}: {first} to {last}{unit}{irregular}"))
+}
+
+/// The name of an axis of voxels.
+fn name_along(description: &Description, along: usize) -> Option<&String> {
+    let dimension = description.axes.iter().find(|axis| axis.role.voxels() == Some(along))?.dimension;
+    Some(&description.dimensions[dimension as usize].name)
 }
 
 fn attributes(owner: &str, all: &[Attribute], verbose: bool) -> String {

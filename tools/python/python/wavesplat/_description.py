@@ -111,8 +111,9 @@ def along_axis(file: File, axis: SourceAxis) -> npt.NDArray[Any] | None:
     """The coordinates of an axis in the order of the source: its own, the times of frames, or those of a grid."""
     listed = _listed(file)
     if axis.name in listed:
-        own = array(listed[axis.name])
-        return file.times if own is None else own[kept(file, axis, len(own))]
+        values, packing = listed[axis.name]
+        own = array(values)
+        return file.times if own is None else _unpacked(own[kept(file, axis, len(own))], packing)
     if axis.role == "t":
         return file.times if len(file.times) else None
     is_placed = not any(other.name in listed for other in file._axes.source if other.role in ("z", "y", "x"))
@@ -124,11 +125,19 @@ def along_axis(file: File, axis: SourceAxis) -> npt.NDArray[Any] | None:
     return None
 
 
-def _listed(file: File) -> dict[str, Any]:
-    """The values of coordinates that the source has, by the name of their axis."""
+def _listed(file: File) -> dict[str, tuple[Any, dict[str, Any]]]:
+    """The values and the attributes of coordinates that the source has, by the name of their axis."""
     described = file.description or {"variables": [], "dimensions": []}
     names = [name for name, *_ in described["dimensions"]]
-    return {name: values for name, along, values, _ in described["variables"] if [names[at] for at in along] == [name]}
+    own = (listed for listed in described["variables"] if [names[at] for at in listed[1]] == [listed[0]])
+    return {name: (values, attributes(attrs)) for name, _, values, attrs in own}
+
+
+def _unpacked(stored: npt.NDArray[Any], attrs: dict[str, Any]) -> npt.NDArray[Any]:
+    """Coordinates, which may be stored as integers."""
+    if "scale_factor" not in attrs and "add_offset" not in attrs:
+        return stored
+    return stored * float(attrs.get("scale_factor", 1)) + float(attrs.get("add_offset", 0))
 
 
 def kept(file: File, axis: SourceAxis, length: int) -> slice:
