@@ -1,6 +1,6 @@
 //! `wavesplat extract`
 
-use crate::{CommonArgs, FrameList, RegionSpec, RemoteArgs, spare_inputs};
+use crate::{CommonArgs, FrameList, RegionSpec, RemoteArgs};
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -99,7 +99,6 @@ pub(crate) fn run(args: &ExtractArgs) -> Result<()> {
     };
     let output = OutputOfExtraction::new(&file, config, &args.output, format)?;
     let paths = output.paths();
-    paths.iter().try_for_each(|path| spare_inputs(std::slice::from_ref(&args.file), path))?;
     let notes = output.notes();
     let report = output.write(args.force, &args.common.progress("extract", "frames"))?;
     notes.iter().for_each(|note| args.common.note(note));

@@ -209,7 +209,7 @@ fn check_lengths(asked: &[Range<u64>], read: &[Vec<u8>]) -> io::Result<()> {
     let lengths = asked.iter().map(|range| range.end - range.start);
     match lengths.eq(read.iter().map(|bytes| bytes.len() as u64)) {
         true => Ok(()),
-        false => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the storage gave too few bytes")),
+        false => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the storage gave other numbers of bytes")),
     }
 }
 

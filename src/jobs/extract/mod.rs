@@ -10,9 +10,7 @@ mod placed;
 mod to_files;
 
 pub use contents::contents;
-pub use placed::extract_to_sink;
 pub use read::read_region;
-pub use sink::{Files, Sink};
 pub use to_files::{OutputOfExtraction, format_of};
 pub use wavesplat_formats::{Contents, Direction, OutputAxis, SampleFormat, SampleOrder};
 
@@ -93,7 +91,7 @@ pub struct ExtractReport {
 }
 
 /// An error if the memory is too small, before anything is written.
-pub fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()> {
+fn check_memory(file: &CoefficientFile, config: &ExtractConfig) -> Result<()> {
     Pieces::new(file, config).map(|_| ())
 }
 

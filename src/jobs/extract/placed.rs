@@ -16,7 +16,7 @@ use wavesplat_formats::{Direction, OutputAxis};
 const PREFERRED: usize = 64 << 20;
 
 /// As [`super::extract`], to a sink. If that is a plain file, samples are written at their places.
-pub fn extract_to_sink(
+pub(super) fn extract_to_sink(
     file: &CoefficientFile,
     config: &ExtractConfig,
     sink: &mut Sink<'_>,

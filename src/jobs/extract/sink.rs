@@ -12,7 +12,7 @@ use wavesplat_formats::writer::{OutputFiles, SampleSink, Samples, Writer};
 
 /// The files that an extraction writes.
 #[derive(Debug)]
-pub struct Files {
+pub(super) struct Files {
     format: SampleFormat,
     /// The files of samples: one for all frames, or one for each.
     samples: Vec<PathBuf>,
@@ -23,7 +23,7 @@ pub struct Files {
 impl Files {
     /// The files for `path`: itself, or `-` for standard output. If each frame has its own file, `path` is a pattern
     /// like `out_%04d.vti`. Headers and lists also have files beside them.
-    pub fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
+    pub(super) fn new(path: &Path, format: SampleFormat, frames: &[usize]) -> Result<Self> {
         let writer = format.writer();
         let (samples, last) = match writer.files {
             OutputFiles::EachFrame => (numbered(path, format, frames)?, None),
@@ -48,7 +48,7 @@ impl Files {
     }
 
     /// All files, in the order in which they are completed.
-    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
         self.samples.iter().chain(&self.last).map(PathBuf::as_path)
     }
 
@@ -135,11 +135,11 @@ const GZIP_LEVEL: Compression = Compression::new(3);
 
 /// Writes samples to the files of an extraction.
 #[derive(Debug)]
-pub struct Sink<'a>(Box<dyn SampleSink + 'a>);
+pub(super) struct Sink<'a>(Box<dyn SampleSink + 'a>);
 
 impl<'a> Sink<'a> {
     /// Opens the first file; existing files are an error unless `force` replaces them.
-    pub fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
+    pub(super) fn create(files: Files, contents: &'a Contents, force: bool) -> Result<Self> {
         let encoding = files.format.encoding(contents);
         Ok(Self(match files.format.writer().files {
             OutputFiles::Folder(create) => create(&files.samples[0], contents, encoding, force)?,
@@ -148,7 +148,7 @@ impl<'a> Sink<'a> {
     }
 
     /// Writes the next samples, given little-endian.
-    pub fn write(&mut self, samples: &[u8]) -> Result<()> {
+    pub(super) fn write(&mut self, samples: &[u8]) -> Result<()> {
         self.0.write(samples)
     }
 
@@ -163,7 +163,7 @@ impl<'a> Sink<'a> {
     }
 
     /// Commits the last file of samples, and writes the list or header if there is one.
-    pub fn finish(self) -> Result<()> {
+    pub(super) fn finish(self) -> Result<()> {
         self.0.finish()
     }
 }

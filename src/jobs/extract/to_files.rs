@@ -1,10 +1,11 @@
 //! Samples in files of other programs' formats.
 
-use super::{
-    Contents, ExtractConfig, ExtractReport, Files, SampleFormat, Sink, check_memory, contents, extract_to_sink,
-};
+use super::placed::extract_to_sink;
+use super::sink::{Files, Sink};
+use super::{Contents, ExtractConfig, ExtractReport, SampleFormat, check_memory, contents};
 use std::path::{Path, PathBuf};
 use wavesplat_core::base::error::{Error, Result};
+use wavesplat_core::base::inputs::spare_inputs;
 use wavesplat_core::base::progress::Progress;
 use wavesplat_engine::file::CoefficientFile;
 
@@ -22,12 +23,19 @@ impl<'a> OutputOfExtraction<'a> {
     /// that of the format.
     ///
     /// # Errors
-    /// A memory that is too small, a name that does not fit the format, and a file that cannot be read.
+    /// Frames that do not ascend or none, a memory that is too small, a name that does not fit the format or is that of `file`, and
+    /// a file that cannot be read.
     pub fn new(file: &'a CoefficientFile, config: ExtractConfig, output: &Path, format: SampleFormat) -> Result<Self> {
+        if config.frames.is_empty() || !config.frames.is_sorted_by(|a, b| a < b) {
+            return Err(Error::setting("frames", "takes numbers that ascend, at least one"));
+        }
         let contents = contents(file, &config)?;
         let config = ExtractConfig { order: format.order(&contents), ..config };
         check_memory(file, &config)?;
         let files = Files::new(output, format, &config.frames)?;
+        if file.path().exists() {
+            files.paths().try_for_each(|path| spare_inputs(&[file.path().into()], path))?;
+        }
         Ok(Self { file, config, format, contents, files })
     }
 

@@ -40,8 +40,11 @@ pub(crate) fn raised(error: Error) -> PyErr {
     }
 }
 
-/// An `OSError`, such as `FileNotFoundError`.
+/// An `OSError`, such as `FileNotFoundError`; or the exception of an object of Python that was read.
 fn of_system(source: &io::Error, words: String) -> PyErr {
+    if let Some(raised) = source.get_ref().and_then(|source| source.downcast_ref::<PyErr>()) {
+        return Python::attach(|py| raised.clone_ref(py));
+    }
     io::Error::new(source.kind(), words).into()
 }
 

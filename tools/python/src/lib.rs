@@ -32,6 +32,8 @@ mod _wavesplat {
     use super::fork::after_fork;
     #[pymodule_export]
     use super::look::{Viewer, render};
+    #[pymodule_export]
+    use super::object::before_end;
 
     #[pymodule_export]
     #[allow(non_upper_case_globals)]

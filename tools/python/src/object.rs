@@ -4,7 +4,46 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::io::{self, ErrorKind};
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 use wavesplat::format::Storage;
+
+/// Calls of objects that go on.
+static CALLS: AtomicUsize = AtomicUsize::new(0);
+/// Whether the interpreter is about to end: then threads that wait for it would end the process by a signal.
+static IS_ENDING: AtomicBool = AtomicBool::new(false);
+/// The longest wait for calls at the end.
+const MOST_AT_END: Duration = Duration::from_secs(5);
+
+/// Refuses new calls of objects, and waits for those that go on. To be called before the interpreter ends.
+#[pyfunction]
+pub(crate) fn before_end(py: Python<'_>) {
+    IS_ENDING.store(true, SeqCst);
+    let began = Instant::now();
+    py.detach(|| {
+        while CALLS.load(SeqCst) > 0 && began.elapsed() < MOST_AT_END {
+            sleep(Duration::from_millis(1));
+        }
+    });
+}
+
+/// A call of an object, until this is dropped.
+struct Calling;
+
+impl Calling {
+    fn begin() -> io::Result<Self> {
+        CALLS.fetch_add(1, SeqCst);
+        let calling = Self;
+        if IS_ENDING.load(SeqCst) { Err(io::Error::other("the interpreter is about to end")) } else { Ok(calling) }
+    }
+}
+
+impl Drop for Calling {
+    fn drop(&mut self) {
+        CALLS.fetch_sub(1, SeqCst);
+    }
+}
 
 /// Calls an object with the starts and the ends of ranges, which returns a list with the bytes of each.
 pub(crate) struct ObjectStorage {
@@ -37,6 +76,7 @@ impl Storage for ObjectStorage {
     }
 
     fn read_many(&self, ranges: &[Range<u64>]) -> io::Result<Vec<Vec<u8>>> {
+        let _calling = Calling::begin()?;
         let read = Python::attach(|py| self.call(py, ranges)).map_err(io::Error::other)?;
         let lengths = ranges.iter().map(|range| (range.end - range.start) as usize);
         match lengths.eq(read.iter().map(Vec::len)) {

@@ -198,10 +198,18 @@ def test_extracting_writes_what_the_program_does(path, decoded, tmp_path):
         ("own.foo", {}, "the extension is none of"),
         ("a.npy", {"y": slice(0, 9, 2)}, "y: takes voxels that follow each other"),
         ("a.npy", {"z": slice(5, 5)}, "z: takes voxels"),
-        ("a.npy", {"t": [5, 3]}, "ascending"),
+        ("a.npy", {"t": [5, 3]}, "t: takes frames that ascend"),
+        ("a.npy", {"t": [3, 3]}, "t: takes frames that ascend"),
+        ("a.npy", {"t": []}, "t: takes frames that ascend, at least one"),
         ("a.npy", {"channel": 1}, "channel"),
     ):
         with pytest.raises(ValueError, match=words):
             file.extract(tmp_path / output, **key)
+    file.extract(tmp_path / "some.npy", 0, z=None, y=slice(0, 4))
+    assert np.array_equal(np.load(tmp_path / "some.npy"), decoded[:1, :, :4])
+    assert np.array_equal(file.read(0, None, slice(0, 4)), decoded[0, :, :4])
+    shutil.copy(path, tmp_path / "self.npy")
+    with pytest.raises(ValueError, match="would replace the input"):
+        wavesplat.open(tmp_path / "self.npy").extract(tmp_path / "self.npy", overwrite=True)
     file.extract(tmp_path / "own.nc", 3, overwrite=True)
     assert len(xr.open_dataset(tmp_path / "own.nc").time) == 1

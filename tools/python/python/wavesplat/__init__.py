@@ -10,6 +10,7 @@ With xarray, ``xr.open_dataset("run.wspl")`` opens a file lazily, and ``ds.to_wa
 ``import wavesplat.xarray``.
 """
 
+import atexit as _atexit
 import os as _os
 import sys as _sys
 
@@ -28,7 +29,9 @@ from ._wavesplat import (
     __version__,
 )
 from ._wavesplat import after_fork as _after_fork
+from ._wavesplat import before_end as _before_end
 
+_atexit.register(_before_end)  # threads that read objects then end before the interpreter
 _os.register_at_fork(after_in_child=_after_fork)  # threads do not follow a fork
 
 if "xarray" in _sys.modules:  # its users expect Dataset.to_wavesplat; others do not wait for its import

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -25,12 +25,10 @@ def others(letters: str) -> list[int]:
     return [axis for axis, letter in enumerate(letters) if letter == "c"]
 
 
-def arranged(array: Any, letters: str) -> Any:
-    """A view with the other axes first, and then those of t, z, y and x that there are."""
+def volumes(array: Any, letters: str) -> Iterator[Any]:
+    """Views (time, z, y, x) of an array, one for each place along the other axes."""
     own = [letters.index(letter) for letter in AXES if letter in letters]
-    return np.transpose(array, others(letters) + own)
-
-
-def with_all(letters: str, place: Sequence[int]) -> tuple[Any, ...]:
-    """The index for an array that was arranged: a place along the other axes, and all of t, z, y and x."""
-    return (*place, *(slice(None) if letter in letters else None for letter in AXES))
+    turned = np.transpose(array, others(letters) + own)
+    all_of_own = tuple(slice(None) if letter in letters else None for letter in AXES)
+    for place in np.ndindex(*turned.shape[: len(others(letters))]):
+        yield turned[(*place, *all_of_own)]  # a view, of a single sample too

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from . import _wavesplat
 from ._arguments import number, pair, text, whole
-from ._axes import AXES, arranged, checked, others, with_all
+from ._axes import AXES, checked, volumes
 from ._convert import Allowed, settings_of
 from ._frames import bytes_of, sample_of
 
@@ -106,10 +106,7 @@ class Chunks:
 
     def _runs(self, samples: Array) -> Iterator[Array]:
         """The samples as (time, z, y, x), for each place along other axes."""
-        letters = self.letters(samples.ndim)
-        turned = arranged(samples, letters)
-        for place in np.ndindex(*turned.shape[: len(others(letters))]):
-            yield turned[with_all(letters, place)]  # a view, of a single sample too
+        return volumes(samples, self.letters(samples.ndim))
 
     def encoded(self, samples: Array, fill: Any = None) -> bytes:
         """The streams of a chunk of an array with a fill value, if it has one."""

@@ -18,7 +18,7 @@ from . import _wavesplat
 from ._arguments import MEMORY, located, whole
 from ._description import Axes, coordinates
 from ._figure import Figure
-from ._index import box_of, read_into, select
+from ._index import Selection, box_of, read_into, select
 from ._objects import ByteRanges, Place, place_of
 from ._options import request
 from ._pictures import pictures
@@ -109,6 +109,9 @@ class File:
     def close(self) -> None:
         """Closes the file and frees what is kept of it. Its samples cannot be read any more."""
         self._native = None
+        if self._object is not None:
+            self._object.close()
+            self._object = None
 
     @property
     def closed(self) -> bool:
@@ -122,7 +125,7 @@ class File:
         self.close()
 
     def __reduce__(self) -> tuple[Any, ...]:  # noqa: D105
-        place = anywhere(self._path) if self._object is None else self._object.file
+        place = anywhere(self._path) if self._object is None else self._object.given
         return _same, (place, self.id, self._options)
 
     def __repr__(self) -> str:  # noqa: D105
@@ -333,7 +336,7 @@ class File:
 
         """
         memory, channel = whole("memory", memory), whole("channel", channel)
-        selection = select((t, z, y, x), self.shape, outer=True)
+        selection = _along_all((t, z, y, x), self.shape)
         if out is None:
             return selection.finish(self._read(selection.items, channel=channel, memory=memory))
         if not isinstance(out, np.ndarray):
@@ -379,7 +382,7 @@ class File:
             path: The file, whose ending says the format: ``.npy``, ``.raw``, ``.nrrd``, ``.nhdr``, ``.vti``, ``.vtr``,
                 ``.pvd``, ``.nc``, ``.nii``, ``.nii.gz``, ``.mha`` or ``.zarr``. ``out_%04d.vti`` is one file for each frame.
             t: Which frames, ascending.
-            z: Which voxels along z, as a number or a slice without a step.
+            z: Which voxels along z, as a number or a slice without a step; all by default.
             y: Which voxels along y.
             x: Which voxels along x.
             channel: Which channel, from 0.
@@ -395,9 +398,10 @@ class File:
             DamagedError: A block is damaged.
 
         """
-        frames, *voxels = select((t, z, y, x), self.shape, outer=True).items
-        box = box_of(voxels)
-        region, output = (box[0][::-1], box[1][::-1]), located(path)
+        frames, *voxels = _along_all((t, z, y, x), self.shape).items
+        if len(frames) == 0 or np.any(np.diff(frames) <= 0):
+            raise ValueError("t: takes frames that ascend, at least one")
+        region, output = box_of(voxels), located(path)
         memory, channel = whole("memory", memory), whole("channel", channel)
         with reporting(progress, "extract") as report:
             return told(*self._file.extract(output, list(frames), region, channel, memory, bool(overwrite), report))
@@ -519,6 +523,11 @@ class File:
         from ._volumes import to_pyvista
 
         return to_pyvista(self, frame, (z, y, x))
+
+
+def _along_all(parts: Sequence[Any], shape: Sequence[int]) -> Selection:
+    """What arguments for each axis ask for; None asks for all."""
+    return select(tuple(slice(None) if part is None else part for part in parts), shape, outer=True)
 
 
 class Outer:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _wavesplat
-from ._axes import arranged, checked, others, with_all
+from ._axes import checked, others, volumes
 
 SAMPLES = {"u1": "u8", "i1": "i8", "u2": "u16", "i2": "i16", "u4": "u32", "i4": "i32"} | {
     "f2": "f16",
@@ -92,7 +92,7 @@ def _in_order(array: Any, letters: str) -> Any:
     if not hasattr(array, "__array_function__"):
         name = type(array).__name__
         raise ValueError(f"axes: {name} cannot be transposed; give numpy.asarray(...) or dask.array.from_array(...)")
-    return arranged(array, letters)[with_all(letters, [0] * len(others(letters)))]
+    return next(volumes(array, letters))
 
 
 def _three(voxels: list[int]) -> list[int]:

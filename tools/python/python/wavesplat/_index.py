@@ -59,13 +59,14 @@ def select(key: Any, shape: Sequence[int], *, outer: bool = False) -> Selection:
 
 
 def box_of(items: Sequence[Items]) -> tuple[list[int], list[int]]:
-    """Where a box of these items along z, y and x starts and stops."""
+    """Where a box of these items along z, y and x starts and stops along x, y and z."""
     for name, along in zip("zyx", items, strict=True):
         if len(along) == 0 or np.any(np.diff(along) != 1):
             raise ValueError(
                 f"{name}: takes voxels that follow each other, at least one; lod= of open() takes every n-th"
             )
-    return [int(along[0]) for along in items], [int(along[-1]) + 1 for along in items]
+    x_first = items[::-1]
+    return [int(along[0]) for along in x_first], [int(along[-1]) + 1 for along in x_first]
 
 
 def _expanded(keys: tuple[Any, ...], axes: int) -> list[slice | Any]:

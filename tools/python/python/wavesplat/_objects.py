@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 import threading
-from io import BufferedReader
 from os import PathLike
 from typing import Any, Protocol
+from weakref import WeakKeyDictionary
 
 from ._arguments import located
 
@@ -18,7 +19,7 @@ class FileObject(Protocol):
         """The next bytes."""
         ...
 
-    def seek(self, offset: int, whence: int, /) -> int:
+    def seek(self, offset: int, whence: int, /) -> Any:
         """Moves."""
         ...
 
@@ -30,38 +31,41 @@ Place = str | PathLike[str] | FileObject
 class ByteRanges:
     """Reads ranges of bytes of a file object, from any thread."""
 
-    def __init__(self, of: Any) -> None:
+    def __init__(self, given: Any) -> None:
         """Of an object that is open for bytes, or a file of fsspec that is not open yet."""
-        is_closed = not hasattr(of, "read") and hasattr(of, "fs") and hasattr(of, "path")
-        self.file = of.fs.open(of.path, "rb") if is_closed else of
-        if not hasattr(self.file, "read"):
-            raise TypeError(f"path: takes a path, an address or a file object, not {of!r}")
-        self.name = _name(self.file)
-        self._lock = threading.Lock()
+        self.given = given
+        self.file = _opened(given)
+        self.name = _name(given)
+        self._lock = _lock_of(self.file)
         self._process = os.getpid()
         if not hasattr(self.file, "seek") or (hasattr(self.file, "seekable") and not self.file.seekable()):
             raise ValueError(f"{self.name}: cannot seek, and files are read by parts")
-        if not isinstance(self.file.read(0), bytes):
+        if isinstance(self.file.read(0), str):
             raise TypeError(f"{self.name}: is open for texts; open it with mode 'rb'")
-        self.length: int = self.file.seek(0, os.SEEK_END)
+        self.file.seek(0, os.SEEK_END)
+        self.length: int = self.file.tell()
 
     def __call__(self, starts: list[int], ends: list[int]) -> list[bytes]:
-        """The bytes of each range. fsspec asks for all of them at once."""
+        """The bytes of each range. Servers are asked for all of them side by side."""
         self.check_process()
-        together = getattr(getattr(self.file, "fs", None), "cat_ranges", None)
-        if together is not None:
-            found: list[bytes] = together([self.file.path] * len(starts), starts, ends, on_error="raise")
-            return found
+        fs: Any = getattr(self.given, "fs", None)
+        if getattr(fs, "async_impl", False):
+            return [_read(part) for part in fs.cat_ranges([self.given.path] * len(starts), starts, ends)]
         with self._lock:
-            return [self._read(start, end - start) for start, end in zip(starts, ends, strict=True)]
+            return [self._range(start, end - start) for start, end in zip(starts, ends, strict=True)]
 
     def check_process(self) -> None:
         """An exception in a forked process: both would move the place in the same file."""
         if self._process != os.getpid():
             raise RuntimeError(f"{self.name}: was opened by another process; open it again in this one")
 
-    def _read(self, start: int, count: int) -> bytes:
-        self.file.seek(start)
+    def close(self) -> None:
+        """Closes the file if it was opened here."""
+        if self.file is not self.given:
+            self.file.close()
+
+    def _range(self, start: int, count: int) -> bytes:
+        self.file.seek(start, os.SEEK_SET)
         parts = []
         while count > 0 and (part := self.file.read(count)):
             parts.append(part)
@@ -71,12 +75,52 @@ class ByteRanges:
 
 def place_of(path: Place) -> str | ByteRanges:
     """A path or an address, also that of a local file which is open; or the bytes of another file object."""
-    if isinstance(path, BufferedReader) and isinstance(path.name, str):
-        return located(path.name)
-    return located(path) if isinstance(path, (str, bytes, PathLike)) else ByteRanges(path)
+    if isinstance(path, (str, bytes, PathLike)):
+        return located(path)
+    name = _local_name(path)
+    return ByteRanges(path) if name is None else located(name)
 
 
-def _name(file: Any) -> str:
+def _local_name(file: Any) -> str | None:
+    """The name of an open file, if it still leads to it."""
+    if not isinstance(file, io.BufferedReader) or type(file.raw) is not io.FileIO or not isinstance(file.name, str):
+        return None
+    try:
+        return file.name if os.path.samestat(os.fstat(file.fileno()), os.stat(file.name)) else None
+    except (OSError, ValueError):
+        return None
+
+
+def _opened(given: Any) -> Any:
+    """An open file: the one that is given, or that of a file of fsspec or a path of another filesystem."""
+    if hasattr(given, "read"):
+        return given
+    if hasattr(given, "full_name"):  # fsspec.open, which knows about compression
+        return given.open()
+    if hasattr(given, "fs") and hasattr(given, "path"):
+        return given.fs.open(given.path, "rb")
+    raise TypeError(f"path: takes a path, an address or a file object, not {given!r}")
+
+
+def _read(part: Any) -> bytes:
+    """The bytes of a range; fsspec may give an exception instead."""
+    if isinstance(part, BaseException):
+        raise part
+    return bytes(part)
+
+
+_LOCKS: WeakKeyDictionary[Any, threading.Lock] = WeakKeyDictionary()
+
+
+def _lock_of(file: Any) -> threading.Lock:
+    """The lock of an object, which several open files may share."""
+    try:
+        return _LOCKS.setdefault(file, threading.Lock())
+    except TypeError:  # it cannot be a key
+        return threading.Lock()
+
+
+def _name(given: Any) -> str:
     """What messages call a file."""
-    known = (getattr(file, name, None) for name in ("full_name", "path", "name"))
-    return next((name for name in known if isinstance(name, str)), repr(file))
+    known = (getattr(given, name, None) for name in ("full_name", "path", "name"))
+    return next((name for name in known if isinstance(name, str)), repr(given))
