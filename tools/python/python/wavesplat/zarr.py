@@ -9,7 +9,6 @@ import struct
 import warnings
 from collections.abc import AsyncIterator, Iterable
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any, NoReturn
 
 import numpy as np
@@ -23,12 +22,13 @@ from zarr.storage import MemoryStore
 from ._codec import WavesplatCodec
 from ._file import File
 from ._file import open as open_file
+from ._objects import Place
 from .xarray import variables_of
 
 __all__ = ["CoefficientStore", "WavesplatCodec", "open"]
 
 
-def open(path: str | PathLike[str], **options: Any) -> zarr.Group:
+def open(path: Place, **options: Any) -> zarr.Group:
     """The group of a coefficient file: its samples, coordinates and attributes. Chunks are decoded when they are read.
 
     Args:
