@@ -1,7 +1,7 @@
 //! The programs' pictures of composites and largest values.
 
 use super::render::decode_png;
-use super::{Work, floats, read_npy, small};
+use super::{Archive, Work, floats, read_npy, small};
 
 /// The header of an array of `f32`, and its numbers.
 fn singles(work: &Work, name: &str) -> (String, Vec<f32>) {
@@ -76,6 +76,23 @@ fn light_changes_colours_and_no_opacity() {
     let opacity = |light: &[f32]| light.iter().skip(3).step_by(4).copied().collect::<Vec<_>>();
     let off = opacity(&plain).iter().zip(opacity(&shaded)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(off < 1e-5, "{off:e}");
+}
+
+#[test]
+fn values_far_from_zero_have_composites_and_surfaces() {
+    let work = Work::new();
+    let warm = |x: usize, y: usize, z: usize, t: usize| {
+        let [x, y, z, t] = [x, y, z, t].map(|n| n as f32);
+        280.0 + (0.6 * x + 0.1 * t).sin() * (0.4 * y).cos() * (0.5 * z).sin()
+    };
+    work.write("warm.npy", Archive::of([20, 18, 16], 8, warm).npy());
+    work.wavesplat("convert warm.npy -o warm.wspl").ok();
+    for mode in ["--mode composite", "--iso 50%"] {
+        let run = work.render(&format!("warm.wspl {SIZE} {mode} --frames 2 -o light.npy")).ok();
+        assert!(!run.err.contains("no sample reaches"), "{}", run.err);
+        let seen = singles(&work, "light.npy").1.chunks(4).filter(|pixel| pixel[3] > 0.2).count();
+        assert!(seen > 100, "{mode}: {seen} pixels");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Recovery of damaged files: intact blocks are recovered and shown; lost blocks are named and never shown as data.
 
-use super::{Archive, Work, floats, places_of, read_npy};
+use super::{Archive, Run, Work, floats, places_of, read_npy};
 use wavesplat::file::CoefficientFile;
 
 /// Five windows of eight frames, in 24 blocks each.
@@ -87,6 +87,23 @@ fn a_file_that_lost_its_second_half_keeps_the_windows_of_the_first() {
     work.wavesplat("recover b.wspl.part -o b.wspl").fails(2, &["b.wspl", "would replace the input"]);
     work.wavesplat("recover b.wspl.part -o so-far.wspl -q").fails(3, &["b.wspl.part", "its end is missing"]);
     work.wavesplat("verify so-far.wspl").ok();
+}
+
+#[test]
+fn a_file_that_lost_its_end_has_no_coordinates_and_recover_says_so() {
+    let (work, _) = work();
+    work.wavesplat("extract a.wspl -o a.nc").ok();
+    work.wavesplat("convert a.nc -o b.wspl --window 8").ok();
+    let file = work.read("b.wspl");
+    let text = |run: &Run| String::from_utf8_lossy(&run.out).into_owned();
+    let run = work.wavesplat("recover b.wspl -o whole.wspl");
+    assert!(work.read("whole.wspl") == file && !text(&run).contains("coordinates"), "{}", text(&run));
+    work.write("cut.wspl", &file[..of_place(&file, b"WEND", 2)]);
+    let run = work.wavesplat("recover cut.wspl -o saved.wspl");
+    assert!(text(&run).contains("lost: the coordinates and attributes of the source"), "{}", text(&run));
+    run.finds(3, &["its end is missing"]);
+    let json = work.wavesplat("recover cut.wspl -o again.wspl --json").json();
+    assert_eq!(json["description_lost"], true);
 }
 
 #[test]

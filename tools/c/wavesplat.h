@@ -159,7 +159,7 @@ int32_t wavesplat_push(struct WavesplatWriter *writer,
 
 // As `wavesplat_push`, for a frame with a time of its own, after that of the frame before. Either all frames have one, or none.
 //
-// As of `wavesplat_push`.
+// `samples` and `strides` are as for `wavesplat_push`.
 int32_t wavesplat_push_at(struct WavesplatWriter *writer,
                           double time,
                           const void *samples,

@@ -26,6 +26,9 @@ end
 
 # Strides may leave out ghost cells. Julia's arrays have x fastest, too.
 function push(writer, field::StridedArray{Float64,3})
+    dims, sample = Ref{NTuple{3,Csize_t}}(), Ref{UInt32}()
+    check(ccall((:wavesplat_frame, library), Int32, (Ptr{Cvoid}, Ref{NTuple{3,Csize_t}}, Ref{UInt32}), writer, dims, sample))
+    size(field) == dims[] || error("a field of $(size(field)) for frames of $(dims[])")
     bytes = collect(Cptrdiff_t, strides(field) .* sizeof(Float64))
     GC.@preserve field check(ccall((:wavesplat_push, library), Int32, (Ptr{Cvoid}, Ptr{Float64}, Ptr{Cptrdiff_t}),
                                    writer, pointer(field), bytes))

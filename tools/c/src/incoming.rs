@@ -145,14 +145,13 @@ impl FrameSource for InMemory {
             self.next += 1;
         }
         let (grid, size, spare) = (self.archive.grid, self.archive.sample.size(), self.incoming.spare.clone());
-        Ok(Box::new(Window { frames, first, grid, size, spare }))
+        Ok(Box::new(Window { frames, grid, size, spare }))
     }
 }
 
 /// Some frames, whose memory goes back to the caller's end.
 struct Window {
     frames: Vec<FrameMemory>,
-    first: usize,
     grid: Grid,
     /// Bytes of a sample.
     size: usize,
@@ -169,8 +168,8 @@ impl FrameWindow for Window {
         Ok(())
     }
 
-    fn name(&self, frame: usize) -> String {
-        format!("frame {}", self.first + frame)
+    fn name(&self, _frame: usize) -> String {
+        "frames".into() // messages say which
     }
 
     fn check_unchanged(&self) -> Result<()> {

@@ -99,7 +99,13 @@ pub unsafe extern "C" fn wavesplat_times(
         // SAFETY: the caller's.
         let WavesplatFile(file) = unsafe { pointed("file", file)? };
         let found = first.checked_add(count).and_then(|end| file.metadata().times.get(first..end));
-        let found = found.ok_or_else(|| Error::value("first", first, format!("and {count} more have no times")))?;
+        let found = found.ok_or_else(|| {
+            Error::value(
+                "first",
+                first,
+                format!("{count} frames from there on have no times; the file has {}", file.metadata().times.len()),
+            )
+        })?;
         // SAFETY: the caller's.
         unsafe { room("times", times, count)? }.copy_from_slice(found);
         Ok(())
@@ -159,7 +165,13 @@ pub unsafe extern "C" fn wavesplat_read(
         };
         let region = Region { start: place(start, [0; 3]), end: place(end, file.grid.dims) };
         let last = first.checked_add(count).filter(|end| *end <= file.frames());
-        let last = last.ok_or_else(|| Error::value("first", first, format!("and {count} more are not in the file")))?;
+        let last = last.ok_or_else(|| {
+            Error::value(
+                "first",
+                first,
+                format!("{count} frames from there on are not in the file, which has {}", file.frames()),
+            )
+        })?;
         let config = ExtractConfig { frames: (first..last).collect(), region, channel, ..ExtractConfig::new(file) };
         extract_into(file, &config, out, &Silent).map(drop)
     })

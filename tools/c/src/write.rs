@@ -99,7 +99,7 @@ pub unsafe extern "C" fn wavesplat_push(
 /// As `wavesplat_push`, for a frame with a time of its own, after that of the frame before. Either all frames have one, or none.
 ///
 /// # Safety
-/// As of `wavesplat_push`.
+/// `samples` and `strides` are as for `wavesplat_push`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn wavesplat_push_at(
     writer: *mut WavesplatWriter,

@@ -272,7 +272,7 @@ fn what_cannot_be_done_is_said() {
         (WavesplatFrames { dims: [usize::MAX, 2, 1], ..frames() }, "{}", "dims"),
         (WavesplatFrames { spacing: [1.0, -1.0, 1.0], ..frames() }, "{}", "spacing"),
         (WavesplatFrames { origin: [f64::NAN; 3], ..frames() }, "{}", "origin"),
-        (WavesplatFrames { time_step: -1.0, ..frames() }, "{}", "times"),
+        (WavesplatFrames { time_step: -1.0, ..frames() }, "{}", "time_step: takes steps above 0"),
         (frames(), "{", "settings"),
         (frames(), "[0.5]", "an object"),
         (frames(), r#"{"shard": "1/2", "range": [0, 1]}"#, "for files of frames"),

@@ -174,6 +174,7 @@ def test_what_cannot_be_read_is_said(path, tmp_path):
         (Unseekable(), ValueError, "cannot seek"),
         (open(path), TypeError, "mode 'rb'"),
         (3, TypeError, "file object"),
+        ("memory://run.wspl", ValueError, "give fsspec.open"),
         (io.BytesIO(b"no coefficients"), wavesplat.DamagedError, "coefficient file"),
         (io.BytesIO(stored[:-1]), wavesplat.DamagedError, "damaged|truncated|cut"),
         (Short(stored), OSError, "other numbers of bytes"),

@@ -418,7 +418,12 @@ impl Ranges {
         if !(0.0 < most && most < hi) {
             return Ok(colours.clone());
         }
-        colours.over((if lo < 0.0 { lo * most / hi } else { lo.min(0.5 * most) }, most))
+        let lo = match lo {
+            ..0.0 => lo * most / hi,
+            _ if lo < most => lo,
+            _ => 0.5 * most, // the extreme values were all of the range
+        };
+        colours.over((lo, most))
     }
 
     /// The range from 0 to the largest value.

@@ -76,9 +76,13 @@ class ByteRanges:
 def place_of(path: Place) -> str | ByteRanges:
     """A path or an address, also that of a local file which is open; or the bytes of another file object."""
     if isinstance(path, (str, bytes, PathLike)):
-        return located(path)
-    name = _local_name(path)
-    return ByteRanges(path) if name is None else located(name)
+        name = located(path)
+        if "://" in name and not name.lower().startswith(("https://", "http://", "s3://")):
+            what = "only https://, http:// and s3:// are read directly; for others, give fsspec.open(address)"
+            raise ValueError(f"{name}: {what}")
+        return name
+    local = _local_name(path)
+    return ByteRanges(path) if local is None else located(local)
 
 
 def _local_name(file: Any) -> str | None:
