@@ -56,7 +56,7 @@ pub struct Recovered {
     pub left_behind: u64,
     /// Whether it is certain that there were no more windows.
     pub all_known: bool,
-    /// Whether the file had a description that is lost. One that was not finished has none yet.
+    /// Whether the file was to have a description, and it is lost. It is written last.
     pub description_lost: bool,
 }
 

@@ -243,13 +243,21 @@ pub fn coordinates(description: &Description, along: usize) -> Option<Vec<f64>> 
     let own = |variable: &&Variable| variable.name == *name && variable.dimensions == [axis.dimension];
     let variable = description.variables.iter().find(own)?;
     let Values::Numbers(numbers) = &variable.values else { return None };
-    let number = |name| first_number(&variable.attributes, name);
-    let (scale, offset) = (number("scale_factor").unwrap_or(1.0), number("add_offset").unwrap_or(0.0));
-    let mut at: Vec<f64> = numbers.to_f64().into_iter().map(|stored| stored * scale + offset).collect();
+    let mut at = unpacked(numbers.to_f64(), |name| first_number(&variable.attributes, name));
     if axis.reversed {
         at.reverse();
     }
     Some(at)
+}
+
+/// The coordinates that stored numbers stand for, by the attributes of the NetCDF conventions.
+pub fn unpacked(stored: Vec<f64>, attribute: impl Fn(&str) -> Option<f64>) -> Vec<f64> {
+    let (scale, offset) = (attribute("scale_factor"), attribute("add_offset"));
+    if scale.is_none() && offset.is_none() {
+        return stored;
+    }
+    let (scale, offset) = (scale.unwrap_or(1.0), offset.unwrap_or(0.0));
+    stored.into_iter().map(|number| number * scale + offset).collect()
 }
 
 /// The first number of an attribute.

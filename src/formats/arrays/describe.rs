@@ -3,7 +3,8 @@
 use super::{ArrayFile, Variable};
 use std::collections::HashSet;
 use wavesplat_core::base::description::{
-    ArrayAxis, Attribute, AxisRole, Description, Dimension, Values, Variable as Described, frames_of, select,
+    ArrayAxis, Attribute, AxisRole, Description, Dimension, NumberType, Values, Variable as Described, frames_of,
+    select,
 };
 use wavesplat_core::source::layout::Axis;
 use wavesplat_core::source::{Extent, Parsed};
@@ -177,7 +178,9 @@ impl Builder<'_> {
     fn values(&self, variable: &Variable) -> Parsed<Values> {
         let Samples { times, .. } = self.samples;
         if *times == Some(variable.path.as_str()) {
-            return Ok(Values::Times(self.file.number_type(&variable.path)?));
+            let is_packed = ["scale_factor", "add_offset"].iter().any(|name| variable.number(name).is_some());
+            let stored = self.file.number_type(&variable.path)?;
+            return Ok(Values::Times(if is_packed { NumberType::F64 } else { stored }));
         }
         let values = self.file.values(&variable.path)?;
         let kept: Vec<Option<Vec<usize>>> =
@@ -205,7 +208,9 @@ impl Builder<'_> {
             Values::Times(_) => frames_of(&self.found).into_iter().collect(), // whatever their own axis is called
             _ => dimensions,
         };
-        let attributes = self.file.described(&variable.path).into_iter().filter(is_users).collect();
+        let are_unpacked = matches!(values, Values::Times(_));
+        let is_kept = |of: &Attribute| is_users(of) && !(are_unpacked && STORAGE.contains(&of.name.as_str()));
+        let attributes = self.file.described(&variable.path).into_iter().filter(is_kept).collect();
         self.found.variables.push(Described { name, dimensions, values, attributes });
     }
 }

@@ -100,7 +100,9 @@ const MOST_COORDINATES: usize = 1 << 24;
 /// The numbers of a coordinate; an error if there are more than an axis can have.
 fn coordinates(file: &dyn ArrayFile, coordinate: &Variable) -> Parsed<Vec<f64>> {
     match coordinate.lengths.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)) {
-        Some(count) if count <= MOST_COORDINATES => file.numbers(&coordinate.path),
+        Some(count) if count <= MOST_COORDINATES => {
+            Ok(description::unpacked(file.numbers(&coordinate.path)?, |name| coordinate.number(name)))
+        }
         _ => Err(format!("{} is too long", coordinate.path)),
     }
 }

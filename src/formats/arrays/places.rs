@@ -82,10 +82,7 @@ impl Places {
 
     /// The coordinates of an axis; None, with a note, if they neither ascend nor descend.
     fn line(&mut self, file: &dyn ArrayFile, coordinate: &Variable) -> Option<AxisCoordinates> {
-        let number = |name, usual| coordinate.number(name).unwrap_or(usual);
-        let (scale, offset) = (number("scale_factor", 1.0), number("add_offset", 0.0));
-        let at = coordinates(file, coordinate).map(|at| at.into_iter().map(|stored| stored * scale + offset).collect());
-        let line = at.ok().and_then(|at| AxisCoordinates::summarise(at, coordinate));
+        let line = coordinates(file, coordinate).ok().and_then(|at| AxisCoordinates::summarise(at, coordinate));
         if line.is_none() {
             let name = coordinate.name();
             self.notes.push(format!("{name} does not ascend or descend: its voxels are numbered").into());

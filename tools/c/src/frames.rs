@@ -90,7 +90,8 @@ impl Frames {
         })?;
         // SAFETY: the caller's.
         let listed = |axis: usize| unsafe { text::listed("coordinates", given.coordinates[axis], given.dims[axis]) };
-        let (grid, coordinates) = placed(given, [listed(0)?, listed(1)?, listed(2)?])?;
+        let listed = [listed(0)?, listed(1)?, listed(2)?];
+        let grid = grid_of(given, &listed)?;
         Ok(Self {
             grid,
             sample,
@@ -98,7 +99,7 @@ impl Frames {
             time_unit: text("time_unit", given.time_unit)?,
             variable: text("variable", given.variable)?,
             unit: text("unit", given.unit)?,
-            coordinates,
+            coordinates: irregular(&grid, listed)?,
         })
     }
 
@@ -124,8 +125,8 @@ impl Frames {
 /// Of a frame: so many can have addresses.
 const MOST_BYTES: usize = isize::MAX as usize;
 
-/// The grid of frames, and the coordinates of its voxels if they are irregular along an axis. There, the grid has the mean distance.
-fn placed(given: &WavesplatFrames, listed: [Option<Vec<f64>>; 3]) -> Result<(Grid, Option<Description>)> {
+/// The grid of frames. Along axes with coordinates it has the mean distance.
+fn grid_of(given: &WavesplatFrames, listed: &[Option<Vec<f64>>; 3]) -> Result<Grid> {
     let spacing = given.spacing.map(|step| if step == 0.0 { 1.0 } else { step });
     let mut grid = Grid { dims: given.dims, spacing, origin: given.origin };
     for (axis, at) in listed.iter().enumerate() {
@@ -142,12 +143,19 @@ fn placed(given: &WavesplatFrames, listed: [Option<Vec<f64>>; 3]) -> Result<(Gri
     if !grid.origin.iter().all(|at| at.is_finite()) {
         return Err(Error::setting("origin", format!("takes finite numbers, not {:?}", grid.origin)));
     }
-    let is_irregular = |axis: usize| listed[axis].as_ref().is_some_and(|at| *at != regular(&grid, axis));
-    let coordinates = (0..3).any(is_irregular).then(|| described(&grid, listed));
-    let all = coordinates.as_ref().map(|coordinates| with_frames(coordinates.clone(), usize::MAX));
-    let size = all.as_ref().map_or(Ok(()), Description::check_size);
+    Ok(grid)
+}
+
+/// The coordinates of all axes, if those of one are irregular.
+fn irregular(grid: &Grid, listed: [Option<Vec<f64>>; 3]) -> Result<Option<Description>> {
+    let is_irregular = |axis: usize| listed[axis].as_ref().is_some_and(|at| *at != regular(grid, axis));
+    if !(0..3).any(is_irregular) {
+        return Ok(None);
+    }
+    let coordinates = described(grid, listed);
+    let size = with_frames(coordinates.clone(), usize::MAX).check_size();
     size.map_err(|e| Error::setting("coordinates", format!("take too much room in a file: {e}")))?;
-    Ok((grid, coordinates))
+    Ok(Some(coordinates))
 }
 
 const NAMES: [&str; 3] = ["x", "y", "z"];

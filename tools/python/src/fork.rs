@@ -4,6 +4,7 @@
 //! Reads and pictures get threads of their own there, one call at a time. All else raises an exception.
 
 use crate::errors::raised;
+use crate::object;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
@@ -27,6 +28,7 @@ const ADVICE: &str = "start processes by multiprocessing.set_start_method(\"spaw
 /// To be called in a process that has just been forked.
 #[pyfunction]
 pub(crate) fn after_fork() {
+    object::after_fork();
     let amid_work = RUNNING.swap(0, SeqCst) > 0;
     AMID_WORK.fetch_or(amid_work, SeqCst);
     FORKED.fetch_or(BEGUN.load(SeqCst), SeqCst);

@@ -11,7 +11,7 @@ use wavesplat::format::Storage;
 
 /// Calls of objects that go on.
 static CALLS: AtomicUsize = AtomicUsize::new(0);
-/// Whether the interpreter is about to end: then threads that wait for it would end the process by a signal.
+/// Whether the interpreter is about to end: a thread that then takes its lock ends the process by a signal.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 /// The longest wait for calls at the end.
 const MOST_AT_END: Duration = Duration::from_secs(5);
@@ -26,6 +26,12 @@ pub(crate) fn before_end(py: Python<'_>) {
             sleep(Duration::from_millis(1));
         }
     });
+}
+
+/// A forked process has none of the threads of its parent, and goes on.
+pub(crate) fn after_fork() {
+    CALLS.store(0, SeqCst);
+    IS_ENDING.store(false, SeqCst);
 }
 
 /// A call of an object, until this is dropped.

@@ -91,6 +91,10 @@ def test_servers_are_asked_for_ranges_together(path, decoded):
     server = Server({"run.wspl": path.read_bytes()})
     assert np.array_equal(wavesplat.open(server.open("run.wspl"))[...], decoded)
     assert 0 < server.asked < 6
+    packed = fsspec.core.OpenFile(
+        Server({"run.wspl": gzip.compress(path.read_bytes())}), "run.wspl", compression="gzip"
+    )
+    assert np.array_equal(wavesplat.open(packed)[3], decoded[3])
     server.asked = 6
     with pytest.raises(ConnectionResetError, match="cut"):
         wavesplat.open(server.open("run.wspl"))
@@ -189,7 +193,10 @@ def test_what_cannot_be_read_is_said(path, tmp_path):
     closed.close()
     with pytest.raises(ValueError, match="closed file"):
         file[...]
-    opened = wavesplat.open(fsspec.open(str(path)))
+    opened = wavesplat.open(fsspec.open(str(path), compression="infer"))
+    assert opened._object is None, "a file of this machine is mapped"
+    (tmp_path / "run.gz").write_bytes(gzip.compress(stored))
+    opened = wavesplat.open(fsspec.open(str(tmp_path / "run.gz"), compression="gzip"))
     inner = opened._object.file
     opened.close()
     assert inner.closed

@@ -296,13 +296,17 @@ def test_axes_without_coordinates_get_none(tmp_path):
 def test_coordinates_may_be_stored_as_integers(tmp_path):
     ds = xr.Dataset({"u": (("t", "lat", "lon"), smooth((4, 5, 6, 7))[:, 0])}, {"lat": 60 - 0.5 * np.arange(6)})
     ds["lon"] = "lon", 10 + 0.25 * np.arange(7)
+    ds["t"] = "t", 100 + 0.5 * np.arange(4)
     packing = {"dtype": "i2", "scale_factor": 0.01, "add_offset": 5.0}
-    ds.to_netcdf(tmp_path / "a.nc", encoding={"lon": packing, "lat": packing})
+    ds.to_netcdf(tmp_path / "a.nc", encoding={"lon": packing, "lat": packing, "t": packing})
     run("convert", tmp_path / "a.nc", "-o", tmp_path / "a.wspl", "--tolerance", "0")
     file = wavesplat.open(tmp_path / "a.wspl")
     np.testing.assert_allclose(file.spacing[:2], (0.25, 0.5))
     np.testing.assert_allclose(file.origin[:2], (10, 57.5))
     np.testing.assert_allclose(file.coords["lat"], ds.lat[::-1])
+    np.testing.assert_allclose(file.times, ds.t)
+    run("extract", tmp_path / "a.wspl", "-o", tmp_path / "b.nc")
+    xr.testing.assert_allclose(xr.open_dataset(tmp_path / "b.nc"), ds)
     xr.testing.assert_allclose(xr.open_dataset(tmp_path / "a.wspl"), ds)
     assert "10 to 11.5" in run("info", tmp_path / "a.wspl")
 

@@ -21,7 +21,8 @@ pub(super) fn text(description: &Description, verbose: bool) -> String {
     if description.orientation.is_some() {
         let _ = writeln!(text, "           the directions of the axes are kept");
     }
-    let shown_above = |name: &String| (0..3).any(|along| name_along(description, along) == Some(name));
+    let has_line = |along: &usize| axis_line(description, *along).is_some();
+    let shown_above = |name: &String| (0..3).filter(has_line).any(|along| name_along(description, along) == Some(name));
     let names = description.variables.iter().map(|variable| &variable.name);
     let others: Vec<&str> = names.filter(|name| !shown_above(name)).map(String::as_str).collect();
     if !others.is_empty() {

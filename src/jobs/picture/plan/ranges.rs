@@ -421,7 +421,7 @@ impl Ranges {
         let lo = match lo {
             ..0.0 => lo * most / hi,
             _ if lo < most => lo,
-            _ => 0.5 * most, // the extreme values were all of the range
+            _ => 0.5 * most, // no pixel reaches the least value
         };
         colours.over((lo, most))
     }

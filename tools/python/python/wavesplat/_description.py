@@ -135,9 +135,9 @@ def _listed(file: File) -> dict[str, tuple[Any, dict[str, Any]]]:
 
 def _unpacked(stored: npt.NDArray[Any], attrs: dict[str, Any]) -> npt.NDArray[Any]:
     """Coordinates, which may be stored as integers."""
-    if "scale_factor" not in attrs and "add_offset" not in attrs:
-        return stored
-    return stored * float(attrs.get("scale_factor", 1)) + float(attrs.get("add_offset", 0))
+    given = {name: np.ravel(attrs.get(name, "")) for name in ("scale_factor", "add_offset")}
+    numbers = {name: float(value[0]) for name, value in given.items() if value.dtype.kind in "fiu"}
+    return stored * numbers.get("scale_factor", 1.0) + numbers.get("add_offset", 0.0) if numbers else stored
 
 
 def kept(file: File, axis: SourceAxis, length: int) -> slice:

@@ -83,7 +83,11 @@ class File:
         place = place_of(path)
         self._object = place if isinstance(place, ByteRanges) else None
         self._path = place.name if isinstance(place, ByteRanges) else place
-        self._native: _wavesplat.File | None = self._opened()
+        try:
+            self._native: _wavesplat.File | None = self._opened()
+        except BaseException:
+            self.close()
+            raise
         self._process = os.getpid()
 
     def _opened(self) -> _wavesplat.File:

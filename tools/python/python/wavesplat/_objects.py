@@ -49,7 +49,7 @@ class ByteRanges:
         """The bytes of each range. Servers are asked for all of them side by side."""
         self.check_process()
         fs: Any = getattr(self.given, "fs", None)
-        if getattr(fs, "async_impl", False):
+        if getattr(fs, "async_impl", False) and getattr(self.given, "compression", None) is None:
             return [_read(part) for part in fs.cat_ranges([self.given.path] * len(starts), starts, ends)]
         with self._lock:
             return [self._range(start, end - start) for start, end in zip(starts, ends, strict=True)]
@@ -81,8 +81,15 @@ def place_of(path: Place) -> str | ByteRanges:
             what = "only https://, http:// and s3:// are read directly; for others, give fsspec.open(address)"
             raise ValueError(f"{name}: {what}")
         return name
-    local = _local_name(path)
+    local = _local_path(path) or _local_name(path)
     return ByteRanges(path) if local is None else located(local)
+
+
+def _local_path(file: Any) -> str | None:
+    """The path of a file of fsspec, if it is one of this machine."""
+    protocol = getattr(getattr(file, "fs", None), "protocol", None)
+    is_plain = not hasattr(file, "read") and getattr(file, "compression", None) is None
+    return str(file.path) if is_plain and protocol in ("file", ("file", "local")) else None
 
 
 def _local_name(file: Any) -> str | None:
