@@ -63,8 +63,8 @@
 //! ```
 //!
 //! [`file::CoefficientFile::open`] also takes addresses, like `https://host/run.wspl`, and
-//! [`file::CoefficientFile::from_storage`] any other storage. [`extract::extract`] and
-//! [`extract::Sink`] write the formats of other programs.
+//! [`file::CoefficientFile::from_storage`] any other storage. [`extract::extract`] gives bytes, and
+//! [`extract::OutputOfExtraction`] writes the formats of other programs.
 //!
 //! # Packages
 //!
