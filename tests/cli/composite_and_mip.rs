@@ -88,7 +88,7 @@ fn values_far_from_zero_have_composites_and_surfaces() {
     work.write("warm.npy", Archive::of([20, 18, 16], 8, warm).npy());
     work.wavesplat("convert warm.npy -o warm.wspl").ok();
     for mode in ["--mode composite", "--iso 50%"] {
-        let run = work.render(&format!("warm.wspl {SIZE} {mode} --frames 2 -o light.npy")).ok();
+        let run = work.render(&format!("warm.wspl {SIZE} {mode} --frames 2 -o light.npy --force")).ok();
         assert!(!run.err.contains("no sample reaches"), "{}", run.err);
         let seen = singles(&work, "light.npy").1.chunks(4).filter(|pixel| pixel[3] > 0.2).count();
         assert!(seen > 100, "{mode}: {seen} pixels");
