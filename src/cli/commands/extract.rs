@@ -148,8 +148,7 @@ fn parse_format(text: &str) -> std::result::Result<SampleFormat, String> {
 }
 
 fn format_of(path: &Path) -> Result<SampleFormat> {
-    if path == Path::new(STANDARD) {
-        return SampleFormat::named("npy").ok_or_else(|| Error::usage("--format: name one"));
-    }
-    extract::format_of(path).map_err(|e| Error::usage(format!("{e} or give --format")))
+    let for_output = SampleFormat::named("npy").filter(|_| path == Path::new(STANDARD));
+    let named = || extract::format_of(path).map_err(|e| Error::usage(format!("{e} or give --format")));
+    for_output.map_or_else(named, Ok)
 }

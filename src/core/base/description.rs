@@ -268,6 +268,17 @@ fn first_number(attributes: &[Attribute], name: &str) -> Option<f64> {
     }
 }
 
+/// Names the axes of voxels x, y and z, and adds the coordinates along each of them, in the order in which they are stored.
+pub fn with_coordinates(mut description: Description, at: &[Vec<f64>; 3]) -> Description {
+    for axis in description.axes.clone() {
+        let Some(along) = axis.role.voxels() else { continue };
+        let (name, values) = (["x", "y", "z"][along].to_string(), Values::floats(&at[along]));
+        description.dimensions[axis.dimension as usize].name.clone_from(&name);
+        description.variables.push(Variable { name, dimensions: vec![axis.dimension], values, attributes: Vec::new() });
+    }
+    description
+}
+
 /// The sides of a patient that the first and the last voxel along an axis lie towards: L, R, A, P, S or I. `None` unless the source says so, and
 /// for axes between two sides.
 pub fn sides(description: &Description, along: usize) -> Option<[char; 2]> {

@@ -3,7 +3,7 @@
 
 use crate::text;
 use std::ffi::c_char;
-use wavesplat::base::description::{ArrayAxis, AxisRole, Description, Dimension, Values, Variable, with_frames};
+use wavesplat::base::description::{ArrayAxis, AxisRole, Description, Dimension, with_coordinates, with_frames};
 use wavesplat::base::sample::SampleType;
 use wavesplat::source::{Archive, RegularTimes};
 use wavesplat::{Error, Grid, Result};
@@ -174,17 +174,16 @@ fn regular(grid: &Grid, axis: usize) -> Vec<f64> {
 }
 
 /// The coordinates along z, y and x.
-fn described(grid: &Grid, mut listed: [Option<Vec<f64>>; 3]) -> Description {
+fn described(grid: &Grid, listed: [Option<Vec<f64>>; 3]) -> Description {
     let mut all = Description { source: "frames of a program".into(), ..Description::default() };
-    for (dimension, (axis, role)) in (0..).zip([(2, AxisRole::Z), (1, AxisRole::Y), (0, AxisRole::X)]) {
-        let at = listed[axis].take().unwrap_or_else(|| regular(grid, axis));
-        let name = || NAMES[axis].to_string();
-        all.dimensions.push(Dimension { name: name(), length: at.len() as u64, unlimited: false });
+    for (dimension, role) in (0..).zip([AxisRole::Z, AxisRole::Y, AxisRole::X]) {
+        let length = role.voxels().map_or(1, |along| grid.dims[along] as u64);
+        all.dimensions.push(Dimension { name: String::new(), length, unlimited: false });
         all.axes.push(ArrayAxis { dimension, role, reversed: false });
-        let (dimensions, values) = (vec![dimension], Values::floats(&at));
-        all.variables.push(Variable { name: name(), dimensions, values, attributes: Vec::new() });
     }
-    all
+    let [x, y, z] = listed;
+    let along = |axis: usize, at: Option<Vec<f64>>| at.unwrap_or_else(|| regular(grid, axis));
+    with_coordinates(all, &[along(0, x), along(1, y), along(2, z)])
 }
 
 /// The number of a type of samples.

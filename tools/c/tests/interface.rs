@@ -56,6 +56,18 @@ fn push(writer: *mut WavesplatWriter, frame: &[f32]) -> i32 {
     unsafe { wavesplat_push(writer, frame.as_ptr().cast(), null()) }
 }
 
+/// Ends a file. The writer is used for the last time.
+fn finish(writer: *mut WavesplatWriter) -> i32 {
+    // SAFETY: `create` made it.
+    unsafe { wavesplat_finish(writer) }
+}
+
+/// Pushes all frames, and ends the file.
+fn push_all(writer: *mut WavesplatWriter, samples: &[f32]) {
+    samples.chunks_exact(VOXELS).for_each(|frame| assert_eq!(push(writer, frame), WAVESPLAT_OK));
+    assert_eq!(finish(writer), WAVESPLAT_OK);
+}
+
 fn open(path: &Path, lod: u32) -> Result<*mut WavesplatFile, i32> {
     let (path, mut file) = (text(path), null_mut());
     // SAFETY: both pointers are valid.
@@ -71,9 +83,7 @@ fn pushed_frames_give_the_bytes_of_an_array() {
     let (pushed, whole) = (folder.path().join("a.wspl"), folder.path().join("b.wspl"));
     let samples = samples(70);
     let writer = create(&pushed, &frames(), r#"{"max_error": 0.01, "window": 32}"#, false).expect("a writer");
-    samples.chunks_exact(VOXELS).for_each(|frame| assert_eq!(push(writer, frame), WAVESPLAT_OK));
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    push_all(writer, &samples);
     let mut source = ArraySource::from_f32(DIMS, &samples).expect("whole frames");
     convert_to_file(&mut source, &ConvertConfig::with_max_error(0.01), &whole).expect("a file");
     assert!(std::fs::read(pushed).expect("a file") == std::fs::read(whole).expect("a file"), "other bytes");
@@ -92,8 +102,7 @@ fn strides_may_leave_out_and_turn_round() {
         // SAFETY: the strides stay within `ghosts`.
         assert_eq!(unsafe { wavesplat_push(writer, ghosts[first..].as_ptr().cast(), strides.as_ptr()) }, WAVESPLAT_OK);
     }
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    assert_eq!(finish(writer), WAVESPLAT_OK);
     let file = open(&path, 0).expect("a file");
     let mut found = vec![0_f32; 2 * VOXELS];
     // SAFETY: `found` has room.
@@ -137,8 +146,7 @@ fn memory_of_the_library_is_taken_as_it_is() {
             },
         }
     }
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    assert_eq!(finish(writer), WAVESPLAT_OK);
     let mut source = ArraySource::from_f32(DIMS, &samples).expect("whole frames");
     convert_to_file(&mut source, &ConvertConfig::with_max_error(0.01), &whole).expect("a file");
     assert!(std::fs::read(path).expect("a file") == std::fs::read(whole).expect("a file"), "other bytes");
@@ -169,8 +177,7 @@ fn frames_have_times_of_their_own() {
             assert_eq!(push(writer, frame), WAVESPLAT_ARGUMENT);
             assert!(message().contains("needs one"), "{}", message());
         }
-        // SAFETY: it is used for the last time.
-        assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+        assert_eq!(finish(writer), WAVESPLAT_OK);
         let file = wavesplat::file::CoefficientFile::open(&path).expect("a file");
         assert_eq!(file.metadata().times, times);
         assert_eq!(wavesplat::file::setting(file.metadata(), "time-units"), Some("s"));
@@ -195,9 +202,7 @@ fn coordinates_are_kept_where_distances_differ() {
     let stretched =
         WavesplatFrames { coordinates: [x.as_ptr(), y.as_ptr(), null()], spacing: [9.0, 0.0, 0.25], ..frames() };
     let writer = create(&path, &stretched, r#"{"window": 8}"#, false).expect("a writer");
-    samples(20).chunks_exact(VOXELS).for_each(|frame| assert_eq!(push(writer, frame), WAVESPLAT_OK));
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    push_all(writer, &samples(20));
     let file = wavesplat::file::CoefficientFile::open(&path).expect("a file");
     assert_eq!(file.grid, Grid { dims: DIMS, spacing: [2.0, 0.5, 0.25], origin: [0.0, 5.0, 0.0] });
     let description = file.description().expect("it is read").expect("one");
@@ -232,9 +237,7 @@ fn a_region_of_some_frames_is_read() {
     let samples = samples(9);
     let timed = WavesplatFrames { first_time: 1.0, time_step: 0.25, ..frames() };
     let writer = create(&path, &timed, r#"{"tolerance": 0}"#, false).expect("a writer");
-    samples.chunks_exact(VOXELS).for_each(|frame| assert_eq!(push(writer, frame), WAVESPLAT_OK));
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    push_all(writer, &samples);
     let file = open(&path, 0).expect("a file");
     let (mut info, mut times) = (WavesplatInfo::default(), [0.0; 4]);
     // SAFETY: all have room.
@@ -311,8 +314,7 @@ fn an_error_on_the_way_ends_the_file() {
     assert_eq!(failed, Some(WAVESPLAT_INPUT), "the conversion says so once it has seen a window");
     assert!(message().contains("missing"), "{}", message());
     assert_eq!(push(writer, &good), WAVESPLAT_ARGUMENT);
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_ARGUMENT);
+    assert_eq!(finish(writer), WAVESPLAT_ARGUMENT);
     assert!(message().contains("failed before") && message().contains("missing"), "{}", message());
     assert!(!path.exists());
 }
@@ -340,8 +342,7 @@ fn the_grid_is_kept() {
     let placed = WavesplatFrames { spacing: [0.5, 0.0, 2.0], origin: [1.0, 2.0, 3.0], ..frames() };
     let writer = create(&path, &placed, "{}", false).expect("a writer");
     assert_eq!(push(writer, &samples(1)), WAVESPLAT_OK);
-    // SAFETY: it is used for the last time.
-    assert_eq!(unsafe { wavesplat_finish(writer) }, WAVESPLAT_OK);
+    assert_eq!(finish(writer), WAVESPLAT_OK);
     let grid = wavesplat::file::CoefficientFile::open(path).expect("a file").grid;
     assert_eq!(grid, Grid { dims: DIMS, spacing: [0.5, 1.0, 2.0], origin: [1.0, 2.0, 3.0] });
 }

@@ -9,7 +9,7 @@ use crate::shared::pieces::Packed;
 use crate::vtk_xml::layout::{RECTILINEAR_GRID, TYPES};
 use std::io::Read;
 use std::path::Path;
-use wavesplat_core::base::description::{Description, Values, Variable};
+use wavesplat_core::base::description::{Description, with_coordinates};
 use wavesplat_core::base::error::{Error, Result};
 use wavesplat_core::base::mapped::{Access, FileBytes};
 use wavesplat_core::base::sample;
@@ -122,16 +122,8 @@ pub(super) fn directions(points: &[Vec<f64>; 3], of: Association) -> Parsed<(Dir
 /// The description of a rectilinear grid: the coordinates of samples along each axis, as they are stored.
 pub(super) fn description(points: &[Vec<f64>; 3], of: Association, layout: &Layout) -> Description {
     let plain = Directions::from_steps([[0.0; 3]; 3], [0.0; 3]).description(RECTILINEAR_GRID, "", layout);
-    let mut description = Description { orientation: None, ..plain };
-    for axis in description.axes.clone() {
-        let Some(along) = axis.role.voxels() else { continue };
-        let (name, at) = (["x", "y", "z"][along], samples(&points[along], of));
-        description.dimensions[axis.dimension as usize].name = name.into();
-        let (dimensions, attributes) = (vec![axis.dimension], Vec::new());
-        let values = Values::floats(&at);
-        description.variables.push(Variable { name: name.into(), dimensions, values, attributes });
-    }
-    description
+    let at = points.each_ref().map(|points| samples(points, of));
+    with_coordinates(Description { orientation: None, ..plain }, &at)
 }
 
 /// The coordinates of samples along an axis: those of points, or the middles of cells.
